@@ -1,0 +1,28 @@
+find_package(Threads REQUIRED)
+find_package(Eigen3 REQUIRED NO_MODULE)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio video calib3d features2d dnn)
+find_package(TBB REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(CGAL REQUIRED)
+
+# Each package as one imported target whose headers are system headers (their warnings are not ours).
+add_library(palpate_opencv INTERFACE)
+target_include_directories(palpate_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
+target_link_libraries(palpate_opencv INTERFACE ${OpenCV_LIBS})
+
+find_path(SUITESPARSE_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+find_library(OPENBLAS_LIBRARY openblas REQUIRED)
+add_library(palpate_cholmod INTERFACE)
+target_include_directories(palpate_cholmod SYSTEM INTERFACE ${SUITESPARSE_INCLUDE})
+target_link_libraries(palpate_cholmod INTERFACE ${CHOLMOD_LIBRARY} ${OPENBLAS_LIBRARY})
+
+# Debian 12 ships Embree 3, Ubuntu 24.04 Embree 4; the few calls we make differ only in their header.
+find_package(embree 4 QUIET)
+if(NOT embree_FOUND)
+  find_package(embree 3 REQUIRED)
+endif()

@@ -1,0 +1,35 @@
+# One folder = one idea = one static library. Headers stand beside sources and are included as "palpate/<folder>/<file>.h".
+#
+#   palpate_folder(stereo PUBLIC palpate_core PRIVATE TBB::tbb)
+function(palpate_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
+  if(PALPATE_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+endfunction()
+
+function(palpate_folder name)
+  cmake_parse_arguments(F "" "" "PUBLIC;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/palpate/${name}/*.cpp)
+  if(NOT sources)
+    file(WRITE ${CMAKE_BINARY_DIR}/empty_${name}.cpp "")
+    set(sources ${CMAKE_BINARY_DIR}/empty_${name}.cpp)
+  endif()
+  add_library(palpate_${name} STATIC ${sources})
+  target_include_directories(palpate_${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  target_link_libraries(palpate_${name} PUBLIC ${F_PUBLIC} PRIVATE ${F_PRIVATE})
+  palpate_warnings(palpate_${name})
+endfunction()
+
+# Tests mirror the folders: palpate_tests(stereo) makes test_stereo from tests/stereo/*.cpp.
+function(palpate_tests name)
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/${name}/*.cpp)
+  if(NOT sources)
+    return()
+  endif()
+  add_executable(test_${name} ${sources})
+  target_link_libraries(test_${name} PRIVATE ${ARGN} palpate_test_support)
+  palpate_warnings(test_${name})
+  gtest_discover_tests(test_${name} PROPERTIES LABELS ${name} DISCOVERY_TIMEOUT 60
+                       DISCOVERY_MODE PRE_TEST)
+endfunction()

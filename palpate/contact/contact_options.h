@@ -1,0 +1,19 @@
+#pragma once
+
+#include "palpate/core/settings.h"
+
+namespace palpate {
+
+enum class Grip { automatic, grasp, push };
+
+/// `contact` of the scene file.
+struct ContactOptions {
+  double threshold_mm = 1.5;         ///< T of Eq. 4: nearer than this, the contact is armed
+  double footprint_radius_mm = 2.0;  ///< of the patch of tissue that the tip holds
+  Grip grip = Grip::automatic;
+  double friction = 0.3;             ///< Coulomb coefficient of a push
+};
+
+void describe(Settings& settings, ContactOptions& options);
+
+}  // namespace palpate

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "palpate/core/settings.h"
+
+namespace palpate {
+
+enum class Law { saint_venant_kirchhoff, neo_hookean };
+
+/// gamma of the paper. Inside, stress is N/mm^2 = MPa.
+struct TissueOptions {
+  Law law = Law::saint_venant_kirchhoff;
+  double young_modulus_kPa = 0;
+  double poisson_ratio = 0.45;
+  std::string preset;  ///< liver, uterus, ...; fills the two numbers above where they are not given
+
+  double young_modulus_MPa() const { return young_modulus_kPa * 1e-3; }
+};
+
+void describe(Settings& settings, TissueOptions& options);
+
+/// "saint-venant-kirchhoff", as in the scene file.
+std::string law_name(Law law);
+
+using Mat3 = Eigen::Matrix3d;
+using Mat9 = Eigen::Matrix<double, 9, 9>;
+
+/// Lame's constants, MPa.
+struct Lame {
+  double lambda = 0;
+  double mu = 0;
+};
+Lame lame_of(const TissueOptions& tissue);
+
+/// Strain energy per rest volume, N mm / mm^3.
+///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E
+///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus, CalculiX)
+double energy_density(Law law, const Lame& lame, const Mat3& F);
+
+/// First Piola-Kirchhoff stress dW/dF, MPa.
+Mat3 first_piola_stress(Law law, const Lame& lame, const Mat3& F);
+
+/// dP/dF as a 9 x 9 matrix on column-major vec(F), MPa.
+Mat9 stress_derivative(Law law, const Lame& lame, const Mat3& F);
+
+/// P F^T / J, MPa.
+Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F);
+
+/// Eq. 5 of the paper.
+double von_mises(const Mat3& stress);
+
+}  // namespace palpate

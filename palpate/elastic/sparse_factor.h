@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <memory>
+
+namespace palpate {
+
+/// Supernodal Cholesky factorisation of a symmetric matrix with a fixed pattern (CHOLMOD, METIS order).
+class SparseFactor {
+ public:
+  SparseFactor();
+  ~SparseFactor();
+  SparseFactor(SparseFactor&&) noexcept;
+  SparseFactor& operator=(SparseFactor&&) noexcept;
+
+  /// Symbolic analysis of the lower triangle's pattern.
+  void analyze(const Eigen::SparseMatrix<double>& lower);
+  /// Numeric factorisation; false when the matrix is not positive definite.
+  bool factorize(const Eigen::SparseMatrix<double>& lower);
+  /// Solves for all columns of B.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& B) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/core/geometry.h"
+
+namespace palpate {
+
+enum class FrameStatus { ok, no_contact, tool_lost, not_converged, map_stale };
+
+std::string status_name(FrameStatus status);
+
+/// Time of each stage of one frame, ms.
+struct FrameTimes {
+  double rectify_ms = 0;
+  double track_ms = 0;
+  double contact_ms = 0;
+  double solve_ms = 0;
+  double stress_ms = 0;
+  double draw_ms = 0;
+  double total_ms() const { return rectify_ms + track_ms + contact_ms + solve_ms + stress_ms + draw_ms; }
+};
+
+/// The answer to one frame; one row of forces.csv. Forces of the instrument on the tissue, left camera frame.
+struct ForceEstimate {
+  int frame = 0;
+  double time_s = 0;
+  FrameStatus status = FrameStatus::no_contact;
+  bool in_contact = false;
+  Vec3 force_N = Vec3::Zero();
+  double mean_nodal_force_N = 0;  ///< F_f of the paper
+  Vec3 tip_mm = Vec3::Zero();
+  double max_von_mises_kPa = 0;
+  double residual = 0;
+  double misfit_mm = 0;
+  std::vector<std::string> warnings;
+  FrameTimes times;
+
+  /// What the overlay draws: the deformed map. Empty where nothing was computed.
+  std::vector<Vec3> deformed_nodes_mm;
+  std::vector<double> node_von_mises_kPa;
+  cv::Mat left_instrument_mask;  ///< rectified left image, 255 = instrument
+};
+
+}  // namespace palpate

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "palpate/core/geometry.h"
+#include "palpate/core/settings.h"
+#include "palpate/elastic/material.h"
+#include "palpate/stereo/match.h"
+#include "palpate/stereo/rig.h"
+#include "palpate/surface/clean_points.h"
+#include "palpate/volume/attachments.h"
+#include "palpate/volume/body.h"
+#include "palpate/volume/tetrahedralize.h"
+
+namespace palpate {
+
+/// `map` of the scene file.
+struct MapOptions {
+  int frame = 0;
+  int elements = 1344;
+  std::vector<cv::Point2d> organ_region_px;
+  double thickness_mm = 25;
+  std::filesystem::path volume;
+  LengthUnit volume_unit = LengthUnit::mm;
+  MatchOptions match;
+  SurfaceOptions surface;
+};
+
+void describe(Settings& settings, MapOptions& options);
+
+/// What the build stage took and left, for map.json.
+struct MapReport {
+  double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, clean_ms = 0, surface_ms = 0, volume_ms = 0,
+         attachments_ms = 0;
+  int matched_points = 0;
+  double coverage = 0;  ///< share of the organ region with a measured disparity
+  double median_depth_deviation_mm = 0;
+  MeshReport mesh;
+};
+
+/// V of Eq. 1 and everything seen on the way to it.
+struct TissueMap {
+  PointCloud cloud;      ///< S
+  Surface surface;       ///< S*
+  TetMesh mesh;          ///< V
+  std::vector<int> fixed_nodes;  ///< b
+  TissueOptions tissue;  ///< gamma
+  DisparityMap disparity;
+  cv::Mat organ_mask;    ///< 255 = organ region, rectified left image
+  MapReport report;
+};
+
+/// Phi of Eq. 1. Throws BadInput with a sentence where a stage cannot go on.
+TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectification, const MapOptions& options,
+                           const TissueOptions& tissue, const AttachmentOptions& attachments);
+
+}  // namespace palpate
