@@ -69,6 +69,7 @@ struct ClosestPoint {
 ClosestPoint closest_point_on_triangle(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c);
 
 /// Nearest point of a triangle mesh by exhaustive search; `triangle` is -1 when there is none.
-ClosestPoint closest_point(const Vec3& point, const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles);
+ClosestPoint closest_point(const Vec3& point, const std::vector<Vec3>& vertices,
+                           const std::vector<Triangle>& triangles);
 
 }  // namespace palpate
