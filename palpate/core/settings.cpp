@@ -74,7 +74,7 @@ bool is_plain_yaml_text(const std::string& text) {
              std::string::npos;
 }
 
-std::string quoted(const std::string& text) {
+std::string yaml_text(const std::string& text) {
   if (is_plain_yaml_text(text)) return text;
   std::string escaped = "\"";
   for (char c : text) {
@@ -168,7 +168,7 @@ void Settings::text(const std::string& key, std::string& field, const std::strin
     if (!node.IsScalar()) throw BadInput(fmt::format("{} is {}, expected a text", place, written(node)));
     field = node.Scalar();
   };
-  entry->write = [&field] { return field.empty() ? std::string() : quoted(field); };
+  entry->write = [&field] { return field.empty() ? std::string() : yaml_text(field); };
   entry->default_text = field;
   entries_.push_back(std::move(entry));
 }
@@ -196,7 +196,7 @@ void Settings::path(const std::string& key, std::filesystem::path& field, const 
     field = (is_device || is_pipeline || is_url) ? std::filesystem::path(expanded)
                                                  : (context.folder / expanded).lexically_normal();
   };
-  entry->write = [&field] { return field.empty() ? std::string() : quoted(field.string()); };
+  entry->write = [&field] { return field.empty() ? std::string() : yaml_text(field.string()); };
   entry->default_text = field.string();
   entries_.push_back(std::move(entry));
 }
