@@ -1,8 +1,9 @@
 # One folder = one idea = one static library. Headers stand beside sources and are included as "palpate/<folder>/<file>.h".
 #
 #   palpate_folder(stereo PUBLIC palpate_core PRIVATE TBB::tbb)
+# -Wno-restrict: GCC 12 warns falsely inside std::string (GCC bug 105651).
 function(palpate_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi -Wno-restrict)
   if(PALPATE_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

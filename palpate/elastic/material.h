@@ -37,7 +37,8 @@ Lame lame_of(const TissueOptions& tissue);
 
 /// Strain energy per rest volume, N mm / mm^3.
 ///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E
-///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus, CalculiX)
+///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus,
+///   CalculiX)
 double energy_density(Law law, const Lame& lame, const Mat3& F);
 
 /// First Piola-Kirchhoff stress dW/dF, MPa.

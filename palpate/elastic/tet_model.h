@@ -25,11 +25,12 @@ class TetModel {
   const std::vector<Vec3>& rest_mm() const { return rest_; }
   const std::vector<Tetrahedron>& tetrahedra() const { return tetrahedra_; }
   const TissueOptions& tissue() const { return tissue_; }
+  double rest_volume_mm3(int element) const { return rest_volume_mm3_[static_cast<size_t>(element)]; }
 
   /// Deformation gradient F = D_s D_m^-1 of one element.
   Mat3 deformation_gradient(const Eigen::VectorXd& u, int element) const;
 
-  /// Elastic energy of the whole body, N mm. Infinite energy is never returned; inverted elements count by their law.
+  /// Elastic energy of the whole body, N mm; infinite where a neo-Hookean element is inverted.
   double energy(const Eigen::VectorXd& u) const;
 
   /// Internal forces (gradient of the energy) on all nodes, N.

@@ -1,0 +1,31 @@
+#include "palpate/elastic/stress.h"
+
+namespace palpate {
+
+namespace {
+constexpr double kKiloPascalPerMegaPascal = 1e3;
+}
+
+std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u) {
+  const Lame lame = lame_of(model.tissue());
+  std::vector<double> stress(static_cast<size_t>(model.element_count()));
+  for (int e = 0; e < model.element_count(); ++e)
+    stress[static_cast<size_t>(e)] =
+        kKiloPascalPerMegaPascal * von_mises(cauchy_stress(model.tissue().law, lame, model.deformation_gradient(u, e)));
+  return stress;
+}
+
+std::vector<double> node_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u) {
+  const std::vector<double> of_element = element_von_mises_kPa(model, u);
+  std::vector<double> sum(static_cast<size_t>(model.node_count()), 0.0), weight = sum;
+  for (int e = 0; e < model.element_count(); ++e)
+    for (int node : model.tetrahedra()[static_cast<size_t>(e)]) {
+      sum[static_cast<size_t>(node)] += model.rest_volume_mm3(e) * of_element[static_cast<size_t>(e)];
+      weight[static_cast<size_t>(node)] += model.rest_volume_mm3(e);
+    }
+  for (size_t n = 0; n < sum.size(); ++n)
+    if (weight[n] > 0) sum[n] /= weight[n];
+  return sum;
+}
+
+}  // namespace palpate

@@ -1,0 +1,168 @@
+#include "palpate/elastic/tet_model.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <stdexcept>
+
+namespace palpate {
+
+namespace {
+
+using Gradients = Eigen::Matrix<double, 4, 3>;  // of the four shape functions, 1/mm
+using Mat12 = Eigen::Matrix<double, 12, 12>;
+
+Gradients shape_gradients(const Mat3& inverse_rest_edges) {
+  Gradients g;
+  g.bottomRows<3>() = inverse_rest_edges;
+  g.row(0) = -(g.row(1) + g.row(2) + g.row(3));
+  return g;
+}
+
+Mat9 positive_part(const Mat9& C) {
+  const Eigen::SelfAdjointEigenSolver<Mat9> eigen(C);
+  if (eigen.eigenvalues()[0] >= 0) return C;
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+Mat12 element_stiffness(const Mat9& C, const Gradients& g, double volume) {
+  // B (9 x 12) maps nodal displacements to vec(F): dF_ij = du_ai g_aj.
+  Eigen::Matrix<double, 9, 12> CB;
+  for (int a = 0; a < 4; ++a)
+    CB.block<9, 3>(0, 3 * a) =
+        g(a, 0) * C.block<9, 3>(0, 0) + g(a, 1) * C.block<9, 3>(0, 3) + g(a, 2) * C.block<9, 3>(0, 6);
+  Mat12 K;
+  for (int a = 0; a < 4; ++a)
+    K.block<3, 12>(3 * a, 0) =
+        volume * (g(a, 0) * CB.block<3, 12>(0, 0) + g(a, 1) * CB.block<3, 12>(3, 0) + g(a, 2) * CB.block<3, 12>(6, 0));
+  return K;
+}
+
+}  // namespace
+
+TetModel::TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::vector<int>& fixed_nodes)
+    : rest_(mesh.nodes_mm), tetrahedra_(mesh.tetrahedra), tissue_(tissue), lame_(lame_of(tissue)) {
+  inverse_rest_edges_.reserve(tetrahedra_.size());
+  rest_volume_mm3_.reserve(tetrahedra_.size());
+  for (const Tetrahedron& t : tetrahedra_) {
+    Mat3 D_m;
+    for (int c = 0; c < 3; ++c)
+      D_m.col(c) = rest_[static_cast<size_t>(t[static_cast<size_t>(c) + 1])] - rest_[static_cast<size_t>(t[0])];
+    const double volume = D_m.determinant() / 6;
+    if (!(volume > 0)) throw std::invalid_argument("TetModel: a tetrahedron has no positive volume");
+    inverse_rest_edges_.push_back(D_m.inverse());
+    rest_volume_mm3_.push_back(volume);
+  }
+  first_unknown_.assign(rest_.size(), 0);
+  for (int node : fixed_nodes) first_unknown_[static_cast<size_t>(node)] = -1;
+  for (int& first : first_unknown_) {
+    if (first < 0) continue;
+    first = unknown_count_;
+    unknown_count_ += 3;
+  }
+  build_pattern();
+}
+
+void TetModel::build_pattern() {
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(tetrahedra_.size() * 78);
+  const auto unknowns_of = [this](const Tetrahedron& t) {
+    std::array<int, 12> unknowns;
+    for (size_t a = 0; a < 4; ++a) {
+      const int first = first_unknown_[static_cast<size_t>(t[a])];
+      for (size_t i = 0; i < 3; ++i) unknowns[3 * a + i] = first < 0 ? -1 : first + static_cast<int>(i);
+    }
+    return unknowns;
+  };
+  for (const Tetrahedron& t : tetrahedra_) {
+    const auto unknowns = unknowns_of(t);
+    for (int column : unknowns)
+      for (int row : unknowns)
+        if (column >= 0 && row >= column) entries.emplace_back(row, column, 0.0);
+  }
+  pattern_.resize(unknown_count_, unknown_count_);
+  pattern_.setFromTriplets(entries.begin(), entries.end());
+  pattern_.makeCompressed();
+
+  scatter_.resize(tetrahedra_.size());
+  for (size_t e = 0; e < tetrahedra_.size(); ++e) {
+    const auto unknowns = unknowns_of(tetrahedra_[e]);
+    for (size_t c = 0; c < 12; ++c)
+      for (size_t r = 0; r < 12; ++r) {
+        const int row = unknowns[r], column = unknowns[c];
+        int& target = scatter_[e][12 * c + r];
+        target = -1;
+        if (column < 0 || row < column) continue;
+        const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
+        const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
+        target = static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
+      }
+  }
+}
+
+Mat3 TetModel::deformation_gradient(const Eigen::VectorXd& u, int element) const {
+  const Tetrahedron& t = tetrahedra_[static_cast<size_t>(element)];
+  const Vec3 u0 = u.segment<3>(3 * t[0]);
+  Mat3 edges_of_u;
+  for (int c = 0; c < 3; ++c) edges_of_u.col(c) = u.segment<3>(3 * t[static_cast<size_t>(c) + 1]) - u0;
+  return Mat3::Identity() + edges_of_u * inverse_rest_edges_[static_cast<size_t>(element)];
+}
+
+double TetModel::energy(const Eigen::VectorXd& u) const {
+  double total = 0;
+  for (int e = 0; e < element_count(); ++e)
+    total += rest_volume_mm3_[static_cast<size_t>(e)] * energy_density(tissue_.law, lame_, deformation_gradient(u, e));
+  return total;
+}
+
+Eigen::VectorXd TetModel::internal_force(const Eigen::VectorXd& u) const {
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(3 * node_count());
+  for (int e = 0; e < element_count(); ++e) {
+    const size_t i = static_cast<size_t>(e);
+    const Mat3 P = first_piola_stress(tissue_.law, lame_, deformation_gradient(u, e));
+    const Gradients g = shape_gradients(inverse_rest_edges_[i]);
+    for (int a = 0; a < 4; ++a)
+      force.segment<3>(3 * tetrahedra_[i][static_cast<size_t>(a)]) += rest_volume_mm3_[i] * P * g.row(a).transpose();
+  }
+  return force;
+}
+
+void TetModel::tangent(const Eigen::VectorXd& u, bool project, Eigen::SparseMatrix<double>& K) const {
+  if (K.nonZeros() != pattern_.nonZeros()) K = pattern_;
+  double* values = K.valuePtr();
+  std::fill(values, values + K.nonZeros(), 0.0);
+  for (int e = 0; e < element_count(); ++e) {
+    const size_t i = static_cast<size_t>(e);
+    Mat9 C = stress_derivative(tissue_.law, lame_, deformation_gradient(u, e));
+    if (project) C = positive_part(C);
+    const Mat12 Ke = element_stiffness(C, shape_gradients(inverse_rest_edges_[i]), rest_volume_mm3_[i]);
+    const std::array<int, 144>& scatter = scatter_[i];
+    const double* entry = Ke.data();
+    for (size_t k = 0; k < 144; ++k)
+      if (scatter[k] >= 0) values[scatter[k]] += entry[k];
+  }
+}
+
+double TetModel::smallest_volume_ratio(const Eigen::VectorXd& u) const {
+  double smallest = 1;
+  for (int e = 0; e < element_count(); ++e) smallest = std::min(smallest, deformation_gradient(u, e).determinant());
+  return smallest;
+}
+
+Eigen::VectorXd TetModel::reduce(const Eigen::VectorXd& full) const {
+  Eigen::VectorXd reduced(unknown_count_);
+  for (size_t n = 0; n < first_unknown_.size(); ++n)
+    if (first_unknown_[n] >= 0)
+      reduced.segment<3>(first_unknown_[n]) = full.segment<3>(3 * static_cast<Eigen::Index>(n));
+  return reduced;
+}
+
+Eigen::VectorXd TetModel::expand(const Eigen::VectorXd& reduced) const {
+  Eigen::VectorXd full = Eigen::VectorXd::Zero(3 * node_count());
+  for (size_t n = 0; n < first_unknown_.size(); ++n)
+    if (first_unknown_[n] >= 0)
+      full.segment<3>(3 * static_cast<Eigen::Index>(n)) = reduced.segment<3>(first_unknown_[n]);
+  return full;
+}
+
+}  // namespace palpate
