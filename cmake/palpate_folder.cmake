@@ -1,9 +1,9 @@
 # One folder = one idea = one static library. Headers stand beside sources and are included as "palpate/<folder>/<file>.h".
 #
 #   palpate_folder(stereo PUBLIC palpate_core PRIVATE TBB::tbb)
-# -Wno-restrict: GCC 12 warns falsely inside std::string (GCC bug 105651).
+# GCC 12 warns falsely inside std::string (-Wrestrict, GCC bug 105651) and the AVX-512 headers (GCC bug 105593).
 function(palpate_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi -Wno-restrict)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi -Wno-restrict -Wno-maybe-uninitialized)
   if(PALPATE_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -11,7 +11,7 @@ struct ContactOptions {
   double threshold_mm = 1.5;         ///< T of Eq. 4: nearer than this, the contact is armed
   double footprint_radius_mm = 2.0;  ///< of the patch of tissue that the tip holds
   Grip grip = Grip::automatic;
-  double friction = 0.3;             ///< Coulomb coefficient of a push
+  double friction = 0.3;  ///< Coulomb coefficient of a push
 };
 
 void describe(Settings& settings, ContactOptions& options);

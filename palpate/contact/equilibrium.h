@@ -9,19 +9,19 @@ namespace palpate {
 struct EquilibriumOptions {
   double relative_residual = 1e-6;  ///< of the largest nodal force
   int most_iterations = 60;
-  double longest_step_mm = 2.0;     ///< prescribed displacement applied at once
+  double longest_step_mm = 2.0;  ///< prescribed displacement applied at once
 };
 
 /// Answer of Eq. 3, with everything needed to judge it.
 struct Equilibrium {
   bool converged = false;
-  double residual = 0;     ///< largest unbalanced nodal force over the largest contact force
+  double residual = 0;  ///< largest unbalanced nodal force over the largest contact force
   int iterations = 0;
   double smallest_volume_ratio = 1;
-  Eigen::VectorXd u;                ///< displacement of every node, mm (3 n)
-  Eigen::VectorXd lambda;           ///< multipliers, 3 per sample, N
-  Vec3 force_N = Vec3::Zero();      ///< of the instrument on the tissue: sum of -J^T lambda
-  double mean_nodal_force_N = 0;    ///< F_f of the paper: mean magnitude of the nodal forces around the contact
+  Eigen::VectorXd u;              ///< displacement of every node, mm (3 n)
+  Eigen::VectorXd lambda;         ///< multipliers, 3 per sample, N
+  Vec3 force_N = Vec3::Zero();    ///< of the instrument on the tissue: sum of -J^T lambda
+  double mean_nodal_force_N = 0;  ///< F_f of the paper: mean magnitude of the nodal forces around the contact
 };
 
 /// Keeps the factor and the last state of one body with one footprint; solves for the displacement p of the footprint.
