@@ -1,0 +1,132 @@
+#include "palpate/simulate/simulate_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "palpate/core/errors.h"
+#include "palpate/simulate/gesture.h"
+
+namespace palpate {
+namespace {
+
+const double kLargest_mm = 1000;
+
+// A key that takes a word or a file: a name without extension has to be one of the words, and loses the folder that
+// reading a path put before it.
+void settle_word_or_file(const std::string& key, std::filesystem::path& value, const std::vector<std::string>& words) {
+  if (value.has_extension()) return;
+  const std::string name = value.filename().string();
+  if (std::find(words.begin(), words.end(), name) == words.end()) {
+    const std::string near = nearest_word(name, words);
+    throw BadInput(fmt::format("{}: \"{}\" is neither {} nor a file{}", key, name, fmt::join(words, ", "),
+                               near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+  }
+  value = name;
+}
+
+void describe_body(Settings& settings, SimulatedBody& body) {
+  settings.path(
+      "shape", body.shape,
+      "pear, slab, heart, or a file with a closed surface or a volume (.msh .vtk .vtu .obj .ply .stl, mm, left "
+      "camera frame, size and place as they are in the file)");
+  settings.vector3("size_mm", body.size_mm, {0, kLargest_mm, true}, "size of the shape before it is turned, mm");
+  settings.vector3("center_mm", body.center_mm, {-kLargest_mm, kLargest_mm},
+                   "middle of the shape, left camera frame, mm");
+  settings.vector3("rotation_deg", body.rotation_deg, {-360, 360},
+                   "turn about the camera's x axis, then y, then z, degrees");
+  settings.integer("elements", body.elements, {100, 200000},
+                   "tetrahedra of the true body, before it is refined at the contact");
+  settings.after_reading([&body] {
+    settle_word_or_file("simulate.body.shape", body.shape, {"pear", "slab", "heart"});
+  });
+}
+
+void describe_light(Settings& settings, SimulatedLight& light) {
+  settings.vector3("position_mm", light.position_mm, {-kLargest_mm, kLargest_mm},
+                   "place of the light, measured from the middle between the eyes, mm");
+  settings.number("radius_mm", light.radius_mm, {0, 100}, "radius of the light, softens shadows, mm");
+  settings.number("reference_mm", light.reference_mm, {0, kLargest_mm, true},
+                  "distance at which a white surface that faces the light is just white, mm");
+}
+
+void describe_noise(Settings& settings, SimulatedNoise& noise) {
+  settings.number("read_levels", noise.read_levels, {0, 50}, "standard deviation in the dark, of 255 levels");
+  settings.number("shot_levels", noise.shot_levels, {0, 50},
+                  "what is added at white, of 255 levels; its variance grows with the level");
+}
+
+void describe_look(Settings& settings, SimulatedLook& look) {
+  settings.path("texture", look.texture, "procedural, or an image of tissue that is laid on from three sides");
+  settings.number("texture_mm_per_px", look.texture_mm_per_px, {0, 10, true},
+                  "size of one pixel of that image on the tissue, mm");
+  settings.integer("seed", look.seed, {0, 1e9}, "of the procedural texture and of the noise");
+  settings.number("roughness", look.roughness, {0.05, 1}, "of the wet surface; smaller makes sharper highlights");
+  settings.number("exposure", look.exposure, {0, 100, true}, "factor on the brightness");
+  settings.group("light", "the light of the scope; brightness falls with the square of the distance",
+                 [&look](Settings& s) { describe_light(s, look.light); });
+  settings.group("noise", "of the sensor", [&look](Settings& s) { describe_noise(s, look.noise); });
+  settings.after_reading([&look] { settle_word_or_file("simulate.look.texture", look.texture, {"procedural"}); });
+}
+
+void describe_camera(Settings& settings, SimulatedCamera& camera) {
+  settings.integer("width", camera.width, {64, 8192}, "of one image, px");
+  settings.integer("height", camera.height, {64, 8192}, "of one image, px");
+  settings.number("focal_px", camera.focal_px, {10, 100000}, "focal length, px");
+  settings.number("baseline_mm", camera.baseline_mm, {1, 200}, "distance between the eyes, mm");
+  settings.number("fps", camera.fps, {1, 1000}, "frames per second");
+  settings.after_reading([&camera] {
+    if (camera.width % 2 != 0 || camera.height % 2 != 0)
+      throw BadInput(fmt::format("simulate.camera: the video needs an even width and height, not {} x {}", camera.width,
+                                 camera.height));
+  });
+}
+
+void describe_instrument(Settings& settings, SimulatedInstrument& instrument) {
+  using Model = SimulatedInstrument::Model;
+  settings.choice("model", instrument.model,
+                  {{"grasper", Model::grasper}, {"probe", Model::probe}, {"hook", Model::hook}},
+                  "shape of the instrument");
+  settings.number("shaft_mm", instrument.shaft_mm, {1, 20}, "diameter of the shaft, mm");
+  settings.vector3("enters_from", instrument.enters_from, {-kLargest_mm, kLargest_mm},
+                   "point that the shaft always passes through, left camera frame, mm");
+  settings.number("free_distance_mm", instrument.free_distance_mm, {0, kLargest_mm, true},
+                  "how far from the contact the tip begins and ends, along the shaft, mm");
+}
+
+void describe_gesture_row(Settings& settings, GestureRow& row) {
+  settings.number("approach_s", row.approach_s, {0, 60},
+                  "come in, free, and touch the tissue at the end of this time, s");
+  settings.pixel("at_px", row.at_px, "with approach_s: pixel of the left image at rest where the tissue is touched");
+  settings.number("footprint_radius_mm", row.footprint_radius_mm, {0, 50, true},
+                  "with approach_s: radius of the patch of tissue that the tip holds, mm");
+  settings.flag("grasp", row.grasp, "the contact begins");
+  settings.vector3(
+      "move_mm", row.move_mm, {-100, 100},
+      "with during_s: where the tip goes, measured from where it grasped: outward normal n, tangent a (to the "
+      "right in the image), tangent b (down), mm");
+  settings.number("during_s", row.during_s, {0, 60}, "time of the move, s");
+  settings.number("hold_s", row.hold_s, {0, 60}, "stay, s");
+  settings.flag("release", row.release, "the contact ends");
+  settings.number("leave_s", row.leave_s, {0, 60}, "with release: time in which the instrument goes away, s");
+}
+
+}  // namespace
+
+void describe(Settings& settings, SimulateOptions& options) {
+  settings.group("body", "the organ at rest", [&](Settings& s) { describe_body(s, options.body); });
+  settings.group("look", "what it looks like", [&](Settings& s) { describe_look(s, options.look); });
+  settings.group("camera", "both eyes", [&](Settings& s) { describe_camera(s, options.camera); });
+  settings.group("instrument", "what touches the tissue",
+                 [&](Settings& s) { describe_instrument(s, options.instrument); });
+  settings.list(
+      "gesture",
+      "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, grasp, "
+      "during_s, hold_s, release",
+      [&options] { return static_cast<int>(options.gesture.size()); },
+      [&options](int count) { options.gesture.assign(static_cast<size_t>(count), GestureRow{}); },
+      [&options](Settings& s, int i) { describe_gesture_row(s, options.gesture[static_cast<size_t>(i)]); });
+  settings.after_reading([&options] { check_gesture(options.gesture); });
+}
+
+}  // namespace palpate

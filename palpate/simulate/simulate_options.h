@@ -1,0 +1,84 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "palpate/core/geometry.h"
+#include "palpate/core/settings.h"
+
+namespace palpate {
+
+/// `simulate.body`: the organ at rest, left camera frame.
+struct SimulatedBody {
+  std::filesystem::path shape = "pear";  ///< pear, slab, heart or a file that read_body opens (already in place)
+  Vec3 size_mm = Vec3(62, 48, 44);       ///< of the shape's box before it is turned; x is the long axis
+  Vec3 center_mm = Vec3(0, 0, 110);
+  Vec3 rotation_deg = Vec3::Zero();  ///< about x, then y, then z of the camera
+  int elements = 4000;               ///< tetrahedra of the truth, before it is refined at the contact
+};
+
+struct SimulatedLight {
+  Vec3 position_mm = Vec3(-5, -7, 0);  ///< from the middle between the eyes
+  double radius_mm = 1.5;              ///< of the disc that shines; softens shadows
+  double reference_mm = 105;           ///< a white surface at this distance, facing the light, is just white
+};
+
+struct SimulatedNoise {
+  double read_levels = 0.7;  ///< standard deviation in the dark, of 255 levels
+  double shot_levels = 1.2;  ///< additional standard deviation at white; its variance grows with the level
+};
+
+/// `simulate.look`.
+struct SimulatedLook {
+  std::filesystem::path texture = "procedural";  ///< procedural, or an image laid on from three sides
+  double texture_mm_per_px = 0.12;               ///< size of a pixel of that image on the tissue
+  int seed = 1;
+  double roughness = 0.36;  ///< of the wet surface
+  double exposure = 1;
+  SimulatedLight light;
+  SimulatedNoise noise;
+};
+
+/// `simulate.camera`: both eyes alike, parallel, no distortion, principal point in the middle of the image.
+struct SimulatedCamera {
+  int width = 960;
+  int height = 540;
+  double focal_px = 700;
+  double baseline_mm = 5;
+  double fps = 25;
+};
+
+/// `simulate.instrument`.
+struct SimulatedInstrument {
+  enum class Model { grasper, probe, hook } model = Model::grasper;
+  double shaft_mm = 6.4;                 ///< diameter
+  Vec3 enters_from = Vec3(130, 25, 20);  ///< the shaft always passes through this point
+  double free_distance_mm = 48;          ///< how far from the contact the tip begins and ends, along the shaft
+};
+
+/// One row of `simulate.gesture`: exactly one of approach_s, grasp, during_s, hold_s, release.
+struct GestureRow {
+  double approach_s = 0;
+  cv::Point2d at_px;
+  double footprint_radius_mm = 3.5;
+  bool grasp = false;
+  Vec3 move_mm = Vec3::Zero();
+  double during_s = 0;
+  double hold_s = 0;
+  bool release = false;
+  double leave_s = 0;
+};
+
+/// `simulate` of the scene file.
+struct SimulateOptions {
+  SimulatedBody body;
+  SimulatedLook look;
+  SimulatedCamera camera;
+  SimulatedInstrument instrument;
+  std::vector<GestureRow> gesture;
+};
+
+/// Keys of the group `simulate`.
+void describe(Settings& settings, SimulateOptions& options);
+
+}  // namespace palpate
