@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "palpate/estimate/force_estimate.h"
+
+namespace palpate {
+
+/// One row of forces.csv or truth.csv. Forces of the instrument on the tissue, left camera frame.
+struct ForceRow {
+  int frame = 0;
+  double time_s = 0;
+  std::string status;  ///< "" where the file names none (truth.csv)
+  bool in_contact = false;
+  Vec3 force_N = Vec3::Zero();
+  double force_magnitude_N = 0;  ///< column force_N
+  double mean_nodal_force_N = 0;
+  Vec3 tip_mm = Vec3::Zero();  ///< not to be read where has_tip() is false
+  double max_von_mises_kPa = 0;
+  double residual = 0;
+  double frame_ms = 0;
+  double misfit_mm = 0;
+  std::string warnings;  ///< names separated by ";"
+
+  bool has_tip() const { return status != "tool_lost" && tip_mm.allFinite(); }
+};
+
+/// What a status promises about force, tip and contact, made true: tool_lost is all zeros, not_converged has no force
+/// but a contact, no_contact has neither. An estimate with a number that is not finite is demoted to the status that
+/// claims less; no field of the answer is NaN.
+ForceRow to_row(const ForceEstimate& estimate);
+
+/// Appends one row per frame to forces.csv; every row is on the disk before the next frame, so that an interrupted run
+/// keeps what is done.
+class ForcesWriter {
+ public:
+  /// Begins the file with its header. Throws Unfinished when it cannot be written.
+  explicit ForcesWriter(const std::filesystem::path& file);
+
+  /// Throws Unfinished when the disk does not take the row.
+  void write(const ForceEstimate& estimate);
+  void write(const ForceRow& row);
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+/// Rows of forces.csv or truth.csv in the order of the file; columns are found by name. frame, in_contact, the three
+/// force components and force_N must be there; without tip columns no row has a tip (a force plate knows none). "nan"
+/// is read as such (other programs write it). Throws BadInput with file and line: missing file, missing column, a field
+/// that is no number.
+std::vector<ForceRow> read_forces(const std::filesystem::path& file);
+
+}  // namespace palpate
