@@ -4,9 +4,9 @@
 
 namespace palpate {
 
-/// Quasi-dense stereo (Stoyanov 2010; the paper's [16]): Lucas-Kanade seeds checked both ways, best-first region growing
-/// by ZNCC with a disparity-gradient limit, sub-pixel refinement of every match, left-right check.
-/// The disparity range [least_px, most_px] may be negative on purpose (to notice swapped eyes).
+/// Quasi-dense stereo (Stoyanov 2010; the paper's [16]): Lucas-Kanade seeds checked both ways, best-first region
+/// growing by ZNCC with a disparity-gradient limit, sub-pixel refinement of every match, left-right check. The
+/// disparity range [least_px, most_px] may be negative on purpose (to notice swapped eyes).
 DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask,
                                double least_disparity_px, double most_disparity_px);
 

@@ -38,9 +38,9 @@ class Recording {
   /// The next frame, or nothing at the end. Throws Unfinished when the video ends before the length its header states.
   std::optional<StereoFrame> next();
 
-  cv::Size size() const;     ///< of one eye, px
-  double fps() const;        ///< frames per second
-  int frame_count() const;   ///< by the header; -1 when unknown (live sources)
+  cv::Size size() const;    ///< of one eye, px
+  double fps() const;       ///< frames per second
+  int frame_count() const;  ///< by the header; -1 when unknown (live sources)
 
  private:
   struct Sources;
