@@ -83,11 +83,11 @@ struct EquilibriumSolver::State {
   Eigen::VectorXd u;       // unknowns of the last equilibrium
   Eigen::VectorXd lambda;  // its multipliers
   Vec3 displacement_mm = Vec3::Zero();
+  int iterations_left = 0;
 
   struct Reached {
     bool converged = false;
     double residual = 0;
-    int iterations = 0;
   };
 
   State(const TetModel& m, const EquilibriumOptions& o) : model(m), options(o) {}
@@ -99,14 +99,13 @@ struct EquilibriumSolver::State {
     const Eigen::VectorXd target = p.replicate(J.rows() / 3, 1);
     Eigen::VectorXd trial = u, multipliers = lambda;
     Reached reached;
-    for (int iteration = 0; iteration <= options.most_iterations; ++iteration) {
+    for (;;) {
       const Eigen::VectorXd full = model.expand(trial);
       const Eigen::VectorXd f_int = model.reduce(model.internal_force(full));
       const Eigen::VectorXd g = target - J * trial;
       const Eigen::VectorXd contact = J.transpose() * multipliers;
       const double scale = std::max(largest_nodal_norm(contact), 1e-9 * stiffness->rho());
       reached.residual = largest_nodal_norm(f_int + contact) / scale;
-      reached.iterations = iteration;
       const bool constrained = g.size() == 0 || g.lpNorm<Eigen::Infinity>() < 1e-9;
       if (constrained && reached.residual <= options.relative_residual) {
         reached.converged = true;
@@ -115,7 +114,8 @@ struct EquilibriumSolver::State {
         displacement_mm = p;
         return reached;
       }
-      if (iteration == options.most_iterations || !stiffness->factorize(model, full)) return reached;
+      if (iterations_left == 0 || !stiffness->factorize(model, full)) return reached;
+      --iterations_left;
       const auto step = solve_bordered(*stiffness, J, f_int, g);
       if (!step) return reached;
       const auto length = step_length(trial, step->du, f_int, constrained);
@@ -141,20 +141,16 @@ struct EquilibriumSolver::State {
 
   Reached move_to(const Vec3& p, int depth) {
     Reached reached = newton(p);
-    if (reached.converged || depth >= kMostSubdivisions) return reached;
-    const int spent = reached.iterations;
-    Reached half = move_to(0.5 * (displacement_mm + p), depth + 1);
-    if (!half.converged) return half;
-    reached = move_to(p, depth + 1);
-    reached.iterations += half.iterations + spent;
-    return reached;
+    if (reached.converged || depth >= kMostSubdivisions || iterations_left == 0) return reached;
+    const Reached half = move_to(0.5 * (displacement_mm + p), depth + 1);
+    return half.converged ? move_to(p, depth + 1) : half;
   }
 
   Equilibrium answer(const Reached& reached) const {
     Equilibrium result;
     result.converged = reached.converged;
     result.residual = reached.residual;
-    result.iterations = reached.iterations;
+    result.iterations = options.most_iterations - iterations_left;
     result.u = model.expand(u);
     result.lambda = lambda;
     result.smallest_volume_ratio = model.smallest_volume_ratio(result.u);
@@ -202,15 +198,12 @@ Equilibrium EquilibriumSolver::solve(const Vec3& displacement_mm) {
   }
   State::Reached reached;
   reached.converged = true;
-  int iterations = 0;
+  s.iterations_left = s.options.most_iterations;
   const Vec3 from = s.displacement_mm;
   const int parts =
       std::max(1, static_cast<int>(std::ceil((displacement_mm - from).norm() / s.options.longest_step_mm)));
-  for (int part = 1; part <= parts && reached.converged; ++part) {
+  for (int part = 1; part <= parts && reached.converged; ++part)
     reached = s.move_to(from + (displacement_mm - from) * part / parts, 0);
-    iterations += reached.iterations;
-  }
-  reached.iterations = iterations;
   return s.answer(reached);
 }
 

@@ -8,8 +8,8 @@ namespace palpate {
 
 struct EquilibriumOptions {
   double relative_residual = 1e-6;  ///< of the largest nodal force
-  int most_iterations = 60;
-  double longest_step_mm = 2.0;  ///< prescribed displacement applied at once
+  int most_iterations = 80;         ///< Newton steps of one call, all parts of the displacement together
+  double longest_step_mm = 2.0;     ///< prescribed displacement applied at once
 };
 
 /// Answer of Eq. 3, with everything needed to judge it.

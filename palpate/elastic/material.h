@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
 
 namespace palpate {
@@ -25,7 +26,6 @@ void describe(Settings& settings, TissueOptions& options);
 /// "saint-venant-kirchhoff", as in the scene file.
 std::string law_name(Law law);
 
-using Mat3 = Eigen::Matrix3d;
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
 /// Lame's constants, MPa.

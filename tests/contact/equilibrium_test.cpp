@@ -1,0 +1,134 @@
+#include "palpate/contact/equilibrium.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "palpate/contact/detect.h"
+#include "tests/support/meshes.h"
+
+namespace palpate {
+namespace {
+
+/// A block clamped at z = 20 whose top face z = 0 looks at the camera.
+struct Block {
+  TetMesh mesh = test::box_mesh({40, 40, 20}, {8, 8, 4});
+  std::vector<Triangle> boundary = boundary_triangles(mesh);
+  TetModel model_of(Law law, double E_kPa) const {
+    return TetModel(mesh, {law, E_kPa, 0.35, ""}, test::nodes_at(mesh, 2, 20));
+  }
+};
+
+TEST(Footprint, SamplesAreIndependentAlsoOnAMeshCoarserThanThePatch) {
+  const Block block;
+  const TetModel model = block.model_of(Law::saint_venant_kirchhoff, 27);
+  for (double radius : {0.5, 2.0, 5.0, 12.0}) {
+    const Footprint footprint = make_footprint(model, block.boundary, {18, 21, -1}, radius);
+    ASSERT_GE(footprint.samples.size(), 1u);
+    const Eigen::MatrixXd J = constraint_matrix(model, footprint);
+    const Eigen::MatrixXd gram = J * J.transpose();
+    const auto eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram).eigenvalues();
+    EXPECT_GT(eigenvalues.minCoeff(), 1e-3) << "radius " << radius;
+  }
+}
+
+TEST(Footprint, StandsOnTheSurfaceWithItsOutwardNormal) {
+  const Block block;
+  const TetModel model = block.model_of(Law::saint_venant_kirchhoff, 27);
+  const Footprint footprint = make_footprint(model, block.boundary, {18, 21, -1}, 3);
+  EXPECT_NEAR((footprint.center_mm - Vec3(18, 21, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((footprint.normal - Vec3(0, 0, -1)).norm(), 0, 1e-12);
+}
+
+TEST(Equilibrium, FollowsTheFootprintAndBalancesTheAttachments) {
+  const Block block;
+  for (Law law : {Law::saint_venant_kirchhoff, Law::neo_hookean})
+    for (const Vec3& p : {Vec3(0, 0, -4), Vec3(1, 2, 1.5), Vec3(3, 0, 0)}) {
+      const TetModel model = block.model_of(law, 27);
+      const Footprint footprint = make_footprint(model, block.boundary, {20, 20, 0}, 4);
+      EquilibriumSolver solver(model);
+      solver.hold(footprint);
+      const Equilibrium found = solver.solve(p);
+      ASSERT_TRUE(found.converged);
+      for (const auto& sample : footprint.samples) {
+        Vec3 moved = Vec3::Zero();
+        for (int c = 0; c < 3; ++c)
+          moved += sample.barycentric[c] * found.u.segment<3>(3 * sample.nodes[static_cast<size_t>(c)]);
+        EXPECT_LT((moved - p).norm(), 1e-8);
+      }
+      Vec3 reaction = Vec3::Zero();
+      const Eigen::VectorXd internal = model.internal_force(found.u);
+      for (int node : test::nodes_at(block.mesh, 2, 20)) reaction += internal.segment<3>(3 * node);
+      EXPECT_LT((found.force_N + reaction).norm(), 1e-5 * found.force_N.norm());
+      EXPECT_GT(found.force_N.dot(p), 0);
+    }
+}
+
+TEST(Equilibrium, TheForceIsProportionalToYoungsModulusAndTheDisplacementIndependentOfIt) {
+  const Block block;
+  const auto solve = [&block](double E_kPa) {
+    const TetModel model = block.model_of(Law::saint_venant_kirchhoff, E_kPa);
+    EquilibriumSolver solver(model);
+    solver.hold(make_footprint(model, block.boundary, {20, 20, 0}, 4));
+    return solver.solve({0.5, 0, -3});
+  };
+  const Equilibrium soft = solve(1), stiff = solve(1e5);
+  ASSERT_TRUE(soft.converged && stiff.converged);
+  EXPECT_NEAR(stiff.force_N.norm() / soft.force_N.norm(), 1e5, 1);
+  EXPECT_LT((stiff.u - soft.u).norm(), 1e-5 * soft.u.norm());
+}
+
+TEST(Equilibrium, DoesTheWorkThatTheBodyStores) {
+  const Block block;
+  const TetModel model = block.model_of(Law::saint_venant_kirchhoff, 27);
+  EquilibriumSolver solver(model);
+  solver.hold(make_footprint(model, block.boundary, {20, 20, 0}, 4));
+  double work = 0;
+  Vec3 last_force = Vec3::Zero(), last_p = Vec3::Zero();
+  Equilibrium found;
+  for (int i = 1; i <= 40; ++i) {
+    const Vec3 p = Vec3(0.5, 0.2, -3) * i / 40;
+    found = solver.solve(p);
+    ASSERT_TRUE(found.converged);
+    work += 0.5 * (found.force_N + last_force).dot(p - last_p);
+    last_force = found.force_N;
+    last_p = p;
+  }
+  EXPECT_NEAR(work, model.energy(found.u), 2e-3 * work);
+}
+
+TEST(Equilibrium, DoesNotDependOnTheWayThere) {
+  const Block block;
+  const TetModel model = block.model_of(Law::neo_hookean, 27);
+  const Footprint footprint = make_footprint(model, block.boundary, {20, 20, 0}, 4);
+  EquilibriumSolver direct(model), detour(model);
+  direct.hold(footprint);
+  detour.hold(footprint);
+  detour.solve({3, 0, -3});
+  detour.solve({0, -2, 1});
+  const Equilibrium a = direct.solve({1, 1, -2}), b = detour.solve({1, 1, -2});
+  ASSERT_TRUE(a.converged && b.converged);
+  EXPECT_LT((a.force_N - b.force_N).norm(), 1e-5 * a.force_N.norm());
+}
+
+TEST(Equilibrium, SaysSoWhereNoStateIsFound) {
+  const Block block;
+  const TetModel model = block.model_of(Law::saint_venant_kirchhoff, 27);
+  EquilibriumSolver solver(model);
+  solver.hold(make_footprint(model, block.boundary, {20, 20, 0}, 4));
+  const Equilibrium found = solver.solve({0, 0, 30});
+  EXPECT_TRUE(found.u.allFinite());
+  EXPECT_TRUE(found.force_N.allFinite());
+  EXPECT_TRUE(!found.converged || found.smallest_volume_ratio < 0.5);
+}
+
+TEST(Detect, TheGapIsPositiveOutsideAndNegativeInside) {
+  const Block block;
+  const Gap outside = gap_to_surface({20, 20, -1.5}, block.mesh.nodes_mm, block.boundary);
+  EXPECT_NEAR(outside.distance_mm, 1.5, 1e-12);
+  EXPECT_NEAR((outside.normal - Vec3(0, 0, -1)).norm(), 0, 1e-12);
+  EXPECT_NEAR(gap_to_surface({20, 20, 0.7}, block.mesh.nodes_mm, block.boundary).distance_mm, -0.7, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,128 @@
+#include "palpate/elastic/tet_model.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <random>
+
+#include "palpate/elastic/sparse_factor.h"
+#include "palpate/elastic/stress.h"
+#include "tests/support/meshes.h"
+
+namespace palpate {
+namespace {
+
+const Law kLaws[] = {Law::saint_venant_kirchhoff, Law::neo_hookean};
+
+TissueOptions tissue_of(Law law) {
+  return {law, 27, 0.45, ""};
+}
+
+Eigen::VectorXd random_displacement(const TetModel& model, double size_mm, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-size_mm, size_mm);
+  Eigen::VectorXd u(3 * model.node_count());
+  for (Eigen::Index i = 0; i < u.size(); ++i) u[i] = uniform(random);
+  return u;
+}
+
+Eigen::VectorXd displacement_of(const TetMesh& mesh, const Mat3& F, const Vec3& shift) {
+  Eigen::VectorXd u(3 * static_cast<Eigen::Index>(mesh.nodes_mm.size()));
+  for (size_t n = 0; n < mesh.nodes_mm.size(); ++n)
+    u.segment<3>(3 * static_cast<Eigen::Index>(n)) = F * mesh.nodes_mm[n] + shift - mesh.nodes_mm[n];
+  return u;
+}
+
+TEST(TetModel, ForcesAreTheGradientOfTheEnergy) {
+  const TetMesh mesh = test::box_mesh({10, 10, 10}, {2, 2, 2});
+  for (Law law : kLaws) {
+    const TetModel model(mesh, tissue_of(law), {});
+    const Eigen::VectorXd u = random_displacement(model, 0.4, 5);
+    const Eigen::VectorXd force = model.internal_force(u);
+    for (int i = 0; i < u.size(); i += 7) {
+      Eigen::VectorXd plus = u, minus = u;
+      plus[i] += 1e-5;
+      minus[i] -= 1e-5;
+      EXPECT_NEAR((model.energy(plus) - model.energy(minus)) / 2e-5, force[i], 1e-7 * force.norm());
+    }
+  }
+}
+
+TEST(TetModel, TheTangentIsTheDerivativeOfTheForcesOnTheUnknowns) {
+  const TetMesh mesh = test::box_mesh({10, 10, 10}, {2, 2, 2});
+  for (Law law : kLaws) {
+    const TetModel model(mesh, tissue_of(law), test::nodes_at(mesh, 2, 0));
+    const Eigen::VectorXd u = model.expand(model.reduce(random_displacement(model, 0.4, 6)));
+    Eigen::SparseMatrix<double> lower;
+    model.tangent(u, false, lower);
+    const Eigen::MatrixXd K = Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>();
+    for (int i = 0; i < model.unknown_count(); i += 5) {
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(model.unknown_count());
+      step[i] = 1e-5;
+      const Eigen::VectorXd plus = model.internal_force(u + model.expand(step)),
+                            minus = model.internal_force(u - model.expand(step));
+      EXPECT_LT((model.reduce(plus - minus) / 2e-5 - K.col(i)).norm(), 1e-6 * K.col(i).norm());
+    }
+  }
+}
+
+TEST(TetModel, ARigidMotionGivesNoForceAndNoStress) {
+  const TetMesh mesh = test::box_mesh({10, 8, 6}, {2, 2, 2});
+  const Mat3 R = Eigen::AngleAxisd(2.1, Vec3(1, -1, 0.5).normalized()).toRotationMatrix();
+  for (Law law : kLaws) {
+    const TetModel model(mesh, tissue_of(law), {});
+    const Eigen::VectorXd u = displacement_of(mesh, R, {30, -10, 4});
+    EXPECT_LT(model.internal_force(u).norm(), 1e-12);
+    for (double stress : element_von_mises_kPa(model, u)) EXPECT_LT(stress, 1e-9);
+  }
+}
+
+TEST(TetModel, ThePatchTestHolds) {
+  const TetMesh mesh = test::box_mesh({10, 8, 6}, {3, 3, 3});
+  std::vector<int> surface_nodes;
+  for (const Triangle& t : boundary_triangles(mesh)) surface_nodes.insert(surface_nodes.end(), t.begin(), t.end());
+  Mat3 F;
+  F << 1.1, 0.05, 0, -0.03, 0.95, 0.02, 0.01, 0, 1.04;
+  for (Law law : kLaws) {
+    const TetModel model(mesh, tissue_of(law), surface_nodes);
+    const Eigen::VectorXd force = model.internal_force(displacement_of(mesh, F, {1, 2, 3}));
+    EXPECT_GT(model.unknown_count(), 0);
+    EXPECT_LT(model.reduce(force).norm(), 1e-12 * force.norm());
+  }
+}
+
+TEST(TetModel, ProjectedTangentsArePositiveSemiDefiniteWhereThePlainOnesAreNot) {
+  const TetMesh mesh = test::box_mesh({10, 10, 10}, {1, 1, 1});
+  const TetModel model(mesh, tissue_of(Law::saint_venant_kirchhoff), {});
+  const Eigen::VectorXd u = displacement_of(mesh, Vec3(0.45, 1, 1).asDiagonal(), Vec3::Zero());
+  Eigen::SparseMatrix<double> plain, projected;
+  model.tangent(u, false, plain);
+  model.tangent(u, true, projected);
+  const auto smallest = [](const Eigen::SparseMatrix<double>& lower) {
+    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
+               Eigen::MatrixXd(Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>()))
+        .eigenvalues()[0];
+  };
+  EXPECT_LT(smallest(plain), -1e-3);
+  EXPECT_GT(smallest(projected), -1e-12);
+}
+
+TEST(SparseFactor, SolvesAndNoticesAnIndefiniteMatrix) {
+  const TetMesh mesh = test::box_mesh({10, 10, 10}, {3, 3, 3});
+  const TetModel model(mesh, tissue_of(Law::neo_hookean), test::nodes_at(mesh, 2, 0));
+  Eigen::SparseMatrix<double> lower;
+  model.tangent(Eigen::VectorXd::Zero(3 * model.node_count()), false, lower);
+  SparseFactor factor;
+  factor.analyze(lower);
+  ASSERT_TRUE(factor.factorize(lower));
+  const Eigen::MatrixXd B = Eigen::MatrixXd::Random(model.unknown_count(), 3);
+  const Eigen::MatrixXd X = factor.solve(B);
+  const Eigen::MatrixXd K = Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>();
+  EXPECT_LT((K * X - B).norm(), 1e-9 * B.norm());
+  const Eigen::SparseMatrix<double> negative = -lower;
+  EXPECT_FALSE(factor.factorize(negative));
+}
+
+}  // namespace
+}  // namespace palpate
