@@ -1,0 +1,225 @@
+#include "palpate/simulate/render.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "palpate/simulate/baked_texture.h"
+#include "palpate/simulate/noise.h"
+#include "palpate/simulate/ray_scene.h"
+#include "palpate/simulate/sensor.h"
+
+namespace palpate {
+namespace {
+
+using Vec3f = Eigen::Vector3f;
+
+const float kShadowStart_mm = 0.05f;  // shadow rays leave the surface by this much
+const float kAmbient = 0.015f;        // light that has been around in the cavity
+const float kSameDepth = 0.02f;       // neighbouring samples belong together when their depths differ by less
+const int kEdgeSteps = 4;             // samples per side of a pixel where surfaces meet
+
+struct DrawnSurface {
+  std::vector<Triangle> triangles;
+  std::vector<Vec3f> normals;
+  BakedTexture texture;
+  float alpha = 0.1f;
+  float reflectance = 0.04f;
+};
+
+struct Sample {
+  Vec3f colour = Vec3f::Zero();
+  int surface = -1;
+  float depth_mm = std::numeric_limits<float>::infinity();
+};
+
+bool belong_together(const Sample& a, const Sample& b) {
+  return a.surface == b.surface &&
+         (a.surface < 0 || std::abs(a.depth_mm - b.depth_mm) < kSameDepth * std::min(a.depth_mm, b.depth_mm));
+}
+
+// Outgoing over incoming light of the specular lobe, times pi and the cosine at the light, so that it adds to an
+// albedo.
+float specular(const Vec3f& n, const Vec3f& to_light, const Vec3f& to_eye, float alpha, float reflectance) {
+  const float n_l = n.dot(to_light), n_v = std::max(1e-3f, n.dot(to_eye));
+  if (n_l <= 0) return 0;
+  const Vec3f half = (to_light + to_eye).normalized();
+  const float n_h = std::max(0.0f, n.dot(half)), v_h = std::max(0.0f, to_eye.dot(half));
+  const float a2 = alpha * alpha;
+  const float d = n_h * n_h * (a2 - 1) + 1;
+  const float distribution = a2 / (d * d);
+  const auto masking = [a2](float c) { return 2 * c / (c + std::sqrt(a2 + (1 - a2) * c * c)); };
+  const float m = 1 - v_h;
+  const float fresnel = reflectance + (1 - reflectance) * m * m * m * m * m;
+  return distribution * masking(n_l) * masking(n_v) * fresnel / (4 * n_v);
+}
+
+}  // namespace
+
+struct Renderer::Scene {
+  SimulatedCamera camera;
+  SimulatedLook look;
+  Vec3f light_mm;
+  float light_power;
+  RayScene rays;
+  std::vector<DrawnSurface> surfaces;
+
+  Vec3f eye_mm(int eye) const { return {eye == 0 ? 0.0f : static_cast<float>(camera.baseline_mm), 0, 0}; }
+
+  // Along the optical axis 1, so that a ray's length is its depth.
+  Vec3f ray_direction(float x_px, float y_px) const {
+    const auto focal = static_cast<float>(camera.focal_px);
+    return {(x_px - 0.5f * static_cast<float>(camera.width - 1)) / focal,
+            (y_px - 0.5f * static_cast<float>(camera.height - 1)) / focal, 1};
+  }
+
+  // The light is a disc that faces forward; `bits` pick the point of it.
+  Vec3f point_of_light(uint32_t bits) const {
+    const float r = static_cast<float>(look.light.radius_mm) * std::sqrt(unit_from_bits(bits));
+    const float angle = 2 * std::numbers::pi_v<float> * unit_from_bits(bits * 0x9E3779B9u);
+    return light_mm + Vec3f(r * std::cos(angle), r * std::sin(angle), 0);
+  }
+
+  Vec3f shade(const RayHit& hit, const Vec3f& point, const Vec3f& to_eye, uint32_t bits) const {
+    const DrawnSurface& surface = surfaces[static_cast<size_t>(hit.surface)];
+    const Triangle& triangle = surface.triangles[static_cast<size_t>(hit.triangle)];
+    const auto normal_at = [&](size_t k) -> const Vec3f& { return surface.normals[static_cast<size_t>(triangle[k])]; };
+    Vec3f smooth = (1 - hit.u - hit.v) * normal_at(0) + hit.u * normal_at(1) + hit.v * normal_at(2);
+    smooth.normalize();
+    if (smooth.dot(to_eye) < 0) smooth = -smooth;
+    const Texel texel = surface.texture.at(hit.triangle, hit.u, hit.v);
+    const Vec3f normal = (smooth - texel.slope + smooth * smooth.dot(texel.slope)).normalized();
+
+    const Vec3f light_point = point_of_light(bits);
+    const Vec3f to_light_mm = light_point - point;
+    const float distance = to_light_mm.norm();
+    const Vec3f to_light = to_light_mm / distance;
+    const float reference = static_cast<float>(look.light.reference_mm);
+    const float arriving = light_power * reference * reference / (distance * distance);
+    const float cosine = normal.dot(to_light);
+    Vec3f colour = kAmbient * arriving * texel.albedo;
+    if (cosine <= 0 || smooth.dot(to_light) <= 0) return colour;
+    if (rays.blocked(point + kShadowStart_mm * smooth, light_point)) return colour;
+    colour += arriving * cosine * texel.albedo;
+    colour.array() += arriving * specular(normal, to_light, to_eye, surface.alpha, surface.reflectance);
+    return colour;
+  }
+
+  Sample sample(int eye, float x_px, float y_px, uint32_t frame) const {
+    const Vec3f origin = eye_mm(eye);
+    const Vec3f direction = ray_direction(x_px, y_px);
+    const RayHit hit = rays.first_hit(origin, direction);
+    Sample result;
+    if (hit.surface < 0) return result;
+    const uint32_t bits = hash_bits(static_cast<uint32_t>(static_cast<int>(std::lround(8 * x_px))),
+                                    static_cast<uint32_t>(static_cast<int>(std::lround(8 * y_px))),
+                                    2 * frame + static_cast<uint32_t>(eye), static_cast<uint32_t>(look.seed));
+    result.surface = hit.surface;
+    result.depth_mm = hit.length;
+    result.colour = shade(hit, origin + hit.length * direction, -direction.normalized(), bits);
+    return result;
+  }
+
+  // Middle and corners of a pixel belong to one smooth surface: their mean. Where surfaces meet: many samples.
+  Vec3f pixel_colour(int eye, int x, int y, uint32_t frame, const Sample& middle,
+                     const std::array<const Sample*, 4>& corners) const {
+    bool smooth = true;
+    for (const Sample* corner : corners) smooth = smooth && belong_together(middle, *corner);
+    if (smooth) {
+      Vec3f sum = 0.5f * middle.colour;
+      for (const Sample* corner : corners) sum += 0.125f * corner->colour;
+      return sum;
+    }
+    Vec3f sum = Vec3f::Zero();
+    for (int j = 0; j < kEdgeSteps; ++j)
+      for (int i = 0; i < kEdgeSteps; ++i) {
+        const auto offset = [](int k) { return (static_cast<float>(k) + 0.5f) / kEdgeSteps - 0.5f; };
+        sum += sample(eye, static_cast<float>(x) + offset(i), static_cast<float>(y) + offset(j), frame)
+                   .colour.cwiseMin(2.0f);
+      }
+    return sum / static_cast<float>(kEdgeSteps * kEdgeSteps);
+  }
+
+  cv::Mat draw(int eye, uint32_t frame) const {
+    const int width = camera.width, height = camera.height;
+    const auto corner_columns = static_cast<size_t>(width) + 1;
+    std::vector<Sample> corners(corner_columns * (static_cast<size_t>(height) + 1));
+    tbb::parallel_for(0, height + 1, [&](int y) {
+      for (int x = 0; x <= width; ++x)
+        corners[static_cast<size_t>(y) * corner_columns + static_cast<size_t>(x)] =
+            sample(eye, static_cast<float>(x) - 0.5f, static_cast<float>(y) - 0.5f, frame);
+    });
+    cv::Mat linear(height, width, CV_32FC3);
+    tbb::parallel_for(0, height, [&](int y) {
+      for (int x = 0; x < width; ++x) {
+        const Sample middle = sample(eye, static_cast<float>(x), static_cast<float>(y), frame);
+        const Sample* corner = &corners[static_cast<size_t>(y) * corner_columns + static_cast<size_t>(x)];
+        const Vec3f rgb = pixel_colour(eye, x, y, frame, middle,
+                                       {corner, corner + 1, corner + corner_columns, corner + corner_columns + 1});
+        linear.at<cv::Vec3f>(y, x) = {rgb.z(), rgb.y(), rgb.x()};
+      }
+    });
+    return linear;
+  }
+};
+
+Renderer::Renderer(const SimulatedCamera& camera, const SimulatedLook& look) : scene_(std::make_unique<Scene>()) {
+  scene_->camera = camera;
+  scene_->look = look;
+  scene_->light_mm = (Vec3(camera.baseline_mm / 2, 0, 0) + look.light.position_mm).cast<float>();
+  scene_->light_power = static_cast<float>(look.exposure);
+}
+
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+
+int Renderer::add(const Surface& rest, const SurfaceLook& look) {
+  const auto alpha = static_cast<float>(look.roughness * look.roughness);
+  scene_->surfaces.push_back({rest.triangles,
+                              {},
+                              BakedTexture(rest, look.texture, look.texels_per_mm),
+                              alpha,
+                              static_cast<float>(look.reflectance)});
+  const int number = scene_->rays.add(rest.triangles, rest.vertices_mm.size());
+  move(number, rest.vertices_mm);
+  return number;
+}
+
+void Renderer::move(int surface, const std::vector<Vec3>& vertices_mm) {
+  DrawnSurface& drawn = scene_->surfaces.at(static_cast<size_t>(surface));
+  drawn.normals.clear();
+  for (const Vec3& normal : vertex_normals(vertices_mm, drawn.triangles)) drawn.normals.push_back(normal.cast<float>());
+  scene_->rays.place(surface, vertices_mm);
+}
+
+StereoFrame Renderer::render(int index) {
+  scene_->rays.commit();
+  StereoFrame frame;
+  frame.index = index;
+  frame.time_s = index / scene_->camera.fps;
+  const auto number = static_cast<uint32_t>(index);
+  const auto seed = static_cast<uint32_t>(scene_->look.seed);
+  frame.left = sensor_image(scene_->draw(0, number), scene_->look.noise, hash_bits(number, 0, 0, seed));
+  frame.right = sensor_image(scene_->draw(1, number), scene_->look.noise, hash_bits(number, 1, 0, seed));
+  return frame;
+}
+
+cv::Mat Renderer::visible_mask(int surface) {
+  scene_->rays.commit();
+  cv::Mat mask(scene_->camera.height, scene_->camera.width, CV_8U, cv::Scalar(0));
+  tbb::parallel_for(0, mask.rows, [&](int y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      const Vec3f direction = scene_->ray_direction(static_cast<float>(x), static_cast<float>(y));
+      if (scene_->rays.first_hit(scene_->eye_mm(0), direction).surface == surface) mask.at<uchar>(y, x) = 255;
+    }
+  });
+  return mask;
+}
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include "palpate/simulate/sensor.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "palpate/simulate/noise.h"
+
+namespace palpate {
+namespace {
+
+const float kShoulder = 0.7f;  // brighter light is compressed, so that highlights do not clip hard
+
+float compressed(float light) {
+  if (light <= kShoulder) return light;
+  return 1 - (1 - kShoulder) * std::exp(-(light - kShoulder) / (1 - kShoulder));
+}
+
+float srgb(float light) {
+  return light <= 0.0031308f ? 12.92f * light : 1.055f * std::pow(light, 1 / 2.4f) - 0.055f;
+}
+
+const int kTableSteps = 8192;
+const float kTableEnd = 4;
+
+// Levels 0..255 of light 0..kTableEnd, finer in the dark (square-root spacing).
+std::array<float, kTableSteps + 1> level_table() {
+  std::array<float, kTableSteps + 1> table{};
+  for (int i = 0; i <= kTableSteps; ++i) {
+    const float root = static_cast<float>(i) / kTableSteps;
+    table[static_cast<size_t>(i)] = 255 * srgb(compressed(root * root * kTableEnd));
+  }
+  return table;
+}
+
+// Sum of four uniforms: near enough to normal, standard deviation 1.
+float normal_from(uint32_t bits) {
+  const float sum = static_cast<float>((bits & 255) + (bits >> 8 & 255) + (bits >> 16 & 255) + (bits >> 24));
+  return (sum - 510) / 147.8f;
+}
+
+}  // namespace
+
+cv::Mat sensor_image(const cv::Mat& linear_bgr, const SimulatedNoise& noise, uint32_t seed) {
+  const auto table = level_table();
+  const float read2 = static_cast<float>(noise.read_levels * noise.read_levels);
+  const float shot2 = static_cast<float>(noise.shot_levels * noise.shot_levels) / 255;
+  cv::Mat image(linear_bgr.size(), CV_8UC3);
+  tbb::parallel_for(0, image.rows, [&](int y) {
+    const auto* light = linear_bgr.ptr<float>(y);
+    auto* out = image.ptr<uchar>(y);
+    for (int i = 0; i < 3 * image.cols; ++i) {
+      const float root = std::sqrt(std::clamp(light[i] / kTableEnd, 0.0f, 1.0f));
+      const float level = table[static_cast<size_t>(root * kTableSteps + 0.5f)];
+      const uint32_t bits = hash_bits(static_cast<uint32_t>(i), static_cast<uint32_t>(y), 17, seed);
+      const float noisy = level + std::sqrt(read2 + shot2 * level) * normal_from(bits);
+      out[i] = cv::saturate_cast<uchar>(noisy);
+    }
+  });
+  return image;
+}
+
+}  // namespace palpate

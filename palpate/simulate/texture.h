@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "palpate/simulate/simulate_options.h"
+
+namespace palpate {
+
+/// What a point of a surface looks like.
+struct Texel {
+  Eigen::Vector3f albedo = Eigen::Vector3f::Constant(0.5f);  ///< linear red, green, blue, 0..1
+  Eigen::Vector3f slope = Eigen::Vector3f::Zero();           ///< gradient of the height of small bumps, mm / mm
+};
+
+/// Texel at a point of the surface at rest (mm) with its outward normal there.
+using Texture = std::function<Texel(const Vec3& rest_mm, const Vec3& normal)>;
+
+/// Organ: mottled red tissue with vessels, a little fat and fine grain, or the image that the options name, laid on
+/// from three sides. Throws BadInput when the image cannot be read.
+Texture tissue_texture(const SimulatedLook& look);
+
+/// The wall of the cavity behind the organ: darker, browner, fat and vessels.
+Texture wall_texture(int seed);
+
+/// Brushed steel.
+Texture steel_texture();
+
+}  // namespace palpate
