@@ -19,9 +19,10 @@ void describe(Settings& settings, MatchOptions& options);
 
 /// Disparity of the rectified left image, left x minus right x, px. All maps have the size of the image.
 struct DisparityMap {
-  cv::Mat disparity_px;  ///< CV_32F, NaN where nothing was matched
-  cv::Mat deviation_px;  ///< CV_32F, one standard deviation of the disparity
-  cv::Mat correlation;   ///< CV_32F, ZNCC -1..1
+  cv::Mat disparity_px;      ///< CV_32F, NaN where nothing was matched
+  cv::Mat deviation_px;      ///< CV_32F, one standard deviation of the disparity
+  cv::Mat correlation;       ///< CV_32F, ZNCC -1..1
+  double row_offset_px = 0;  ///< matches lie this many rows lower in the right image (corrected for before matching)
 };
 
 /// Dense disparity of a rectified pair where `mask` (8-bit, size of the image) is not zero, by the matcher that the

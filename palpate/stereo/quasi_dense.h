@@ -1,6 +1,7 @@
 #pragma once
 
 #include "palpate/stereo/match.h"
+#include "palpate/stereo/seeds.h"
 
 namespace palpate {
 
@@ -9,6 +10,10 @@ namespace palpate {
 /// disparity range [least_px, most_px] may be negative on purpose (to notice swapped eyes).
 DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask,
                                double least_disparity_px, double most_disparity_px);
+
+/// The same from seeds found before, on eyes whose rows are aligned (see align_rows).
+DisparityMap match_quasi_dense(const Eyes& eyes, const Seeds& seeds, double least_disparity_px,
+                               double most_disparity_px);
 
 /// 255 where a pixel shows tissue that can be matched: inside the image, no specular highlight (saturated, colourless,
 /// grown by its halo), not the black border of the scope.

@@ -1,0 +1,70 @@
+#include "palpate/stereo/eyes.h"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "palpate/stereo/quasi_dense.h"
+
+namespace palpate {
+namespace {
+
+constexpr int kSaturated = 235;  // a highlight is bright in every channel
+constexpr int kBlack = 14;       // the border of the scope, and nothing lit
+constexpr int kHalo_px = 5;      // highlights shine into their neighbourhood
+
+// Black that touches the rim of the image.
+cv::Mat black_border(const cv::Mat& bgr) {
+  cv::Mat brightest;
+  cv::Mat channels[3];
+  cv::split(bgr, channels);
+  cv::max(channels[0], channels[1], brightest);
+  cv::max(brightest, channels[2], brightest);
+  cv::Mat framed;
+  cv::copyMakeBorder(brightest <= kBlack, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  cv::floodFill(framed, {0, 0}, cv::Scalar(128));
+  return framed(cv::Rect({1, 1}, bgr.size())) == 128;
+}
+
+}  // namespace
+
+cv::Mat matchable_mask(const cv::Mat& bgr) {
+  cv::Mat channels[3];
+  cv::split(bgr, channels);
+  cv::Mat darkest;
+  cv::min(channels[0], channels[1], darkest);
+  cv::min(darkest, channels[2], darkest);
+  cv::Mat blocked = darkest >= kSaturated;
+  const cv::Mat halo = cv::getStructuringElement(cv::MORPH_ELLIPSE, {kHalo_px, kHalo_px});
+  cv::dilate(blocked, blocked, halo);
+  cv::Mat border = black_border(bgr);
+  cv::dilate(border, border, halo);
+  return ~(blocked | border);
+}
+
+Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask) {
+  Eyes eyes;
+  eyes.left_mask = matchable_mask(left_bgr) & mask;
+  eyes.right_mask = matchable_mask(right_bgr);
+  cv::Mat left, right;
+  cv::cvtColor(left_bgr, left, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(right_bgr, right, cv::COLOR_BGR2GRAY);
+  cv::Scalar left_mean, left_deviation, right_mean, right_deviation;
+  cv::meanStdDev(left, left_mean, left_deviation, matchable_mask(left_bgr));
+  cv::meanStdDev(right, right_mean, right_deviation, eyes.right_mask);
+  const double gain = right_deviation[0] > 1 ? left_deviation[0] / right_deviation[0] : 1;
+  left.convertTo(eyes.left, CV_32F);
+  right.convertTo(eyes.right, CV_32F, gain, left_mean[0] - gain * right_mean[0]);
+  return eyes;
+}
+
+void align_rows(Eyes& eyes, double row_offset_px) {
+  if (std::abs(row_offset_px) < 0.02) return;
+  const cv::Matx23d right_from_aligned(1, 0, 0, 0, 1, row_offset_px);
+  const int from_destination = cv::WARP_INVERSE_MAP;
+  cv::warpAffine(eyes.right, eyes.right, right_from_aligned, eyes.right.size(), cv::INTER_CUBIC | from_destination,
+                 cv::BORDER_REPLICATE);
+  cv::warpAffine(eyes.right_mask, eyes.right_mask, right_from_aligned, eyes.right_mask.size(),
+                 cv::INTER_NEAREST | from_destination);
+}
+
+}  // namespace palpate

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace palpate {
+
+/// Both images of a rectified pair made ready for matching: grey, the right one with the mean and the deviation of the
+/// left one (a gain difference of 5 % already stops Lucas-Kanade), and where each shows tissue that can be matched.
+struct Eyes {
+  cv::Mat left;        ///< CV_32F, grey levels
+  cv::Mat right;       ///< CV_32F, grey levels
+  cv::Mat left_mask;   ///< 8-bit, 255 = can be matched
+  cv::Mat right_mask;  ///< 8-bit, 255 = can be matched
+};
+
+/// `mask` (8-bit) is where the left image is wanted.
+Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask);
+
+/// The right image and its mask moved up by `row_offset_px`, so that its rows match those of the left one.
+void align_rows(Eyes& eyes, double row_offset_px);
+
+}  // namespace palpate

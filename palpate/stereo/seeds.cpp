@@ -1,0 +1,117 @@
+#include "palpate/stereo/seeds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+namespace palpate {
+namespace {
+
+constexpr int kMostCorners = 600;
+constexpr int kCoarse = 4;        // the search along the row works on images this many times smaller
+constexpr int kCoarseRadius = 4;  // of its windows
+constexpr float kMostReturn_px = 0.5f;
+constexpr float kMostRowOffset_px = 3.0f;
+constexpr float kMostRowScatter_px = 1.0f;
+
+std::vector<cv::Point2f> corners_of(const cv::Mat& grey, const cv::Mat& mask) {
+  cv::Mat half, half_mask;
+  cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  cv::resize(mask, half_mask, half.size(), 0, 0, cv::INTER_NEAREST);
+  const double spacing = std::max(4.0, std::sqrt(cv::countNonZero(half_mask) / (1.5 * kMostCorners)));
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(half, corners, kMostCorners, 0.002, spacing, half_mask, 5);
+  for (cv::Point2f& corner : corners) corner = 2 * corner + cv::Point2f(0.5f, 0.5f);
+  return corners;
+}
+
+// ZNCC of two square windows whose centres lie inside both images by at least the radius.
+float correlation(const cv::Mat& left, cv::Point at, const cv::Mat& right, cv::Point there) {
+  constexpr int r = kCoarseRadius;
+  constexpr float n = (2 * r + 1) * (2 * r + 1);
+  float l = 0, ll = 0, m = 0, mm = 0, lm = 0;
+  for (int v = -r; v <= r; ++v) {
+    const float* a = left.ptr<float>(at.y + v) + at.x;
+    const float* b = right.ptr<float>(there.y + v) + there.x;
+    for (int u = -r; u <= r; ++u) {
+      l += a[u], ll += a[u] * a[u];
+      m += b[u], mm += b[u] * b[u];
+      lm += a[u] * b[u];
+    }
+  }
+  const float variances = (ll - l * l / n) * (mm - m * m / n);
+  return variances > 1e-3f ? (lm - l * m / n) / std::sqrt(variances) : 0;
+}
+
+// Where each corner is best found along its row, roughly.
+std::vector<cv::Point2f> coarse_search(const Eyes& eyes, const std::vector<cv::Point2f>& corners, double least,
+                                       double most) {
+  cv::Mat left, right;
+  cv::resize(eyes.left, left, {}, 1.0 / kCoarse, 1.0 / kCoarse, cv::INTER_AREA);
+  cv::resize(eyes.right, right, left.size(), 0, 0, cv::INTER_AREA);
+  const cv::Rect inside(kCoarseRadius, kCoarseRadius, left.cols - 2 * kCoarseRadius, left.rows - 2 * kCoarseRadius);
+  std::vector<cv::Point2f> found = corners;
+  for (cv::Point2f& corner : found) {
+    const cv::Point at(static_cast<int>(corner.x / kCoarse), static_cast<int>(corner.y / kCoarse));
+    if (!inside.contains(at)) continue;
+    float best = -1;
+    int best_shift = 0;
+    for (int shift = cvFloor(least / kCoarse); shift <= cvCeil(most / kCoarse); ++shift) {
+      const cv::Point there(at.x - shift, at.y);
+      if (!inside.contains(there)) continue;
+      const float score = correlation(left, at, right, there);
+      if (score > best) best = score, best_shift = shift;
+    }
+    corner.x -= static_cast<float>(kCoarse * best_shift);
+  }
+  return found;
+}
+
+double median(std::vector<float> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_disparity_px) {
+  Seeds seeds;
+  cv::Mat left, right;
+  eyes.left.convertTo(left, CV_8U);
+  eyes.right.convertTo(right, CV_8U);
+  const std::vector<cv::Point2f> corners = corners_of(left, eyes.left_mask);
+  seeds.corners = static_cast<int>(corners.size());
+  if (corners.empty()) return seeds;
+
+  std::vector<cv::Point2f> there = coarse_search(eyes, corners, least_disparity_px, most_disparity_px);
+  std::vector<cv::Point2f> back = corners;
+  std::vector<uchar> found, found_back;
+  std::vector<float> error;
+  const cv::Size window(21, 21);
+  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 15, 0.02);
+  cv::calcOpticalFlowPyrLK(left, right, corners, there, found, error, window, 2, until, cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::calcOpticalFlowPyrLK(right, left, there, back, found_back, error, window, 2, until, cv::OPTFLOW_USE_INITIAL_FLOW);
+
+  const cv::Rect image({0, 0}, left.size());
+  std::vector<size_t> kept;
+  std::vector<float> rows;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const float disparity = corners[i].x - there[i].x;
+    if (!found[i] || !found_back[i] || !image.contains(there[i]) || !eyes.right_mask.at<uchar>(there[i])) continue;
+    if (cv::norm(back[i] - corners[i]) > kMostReturn_px) continue;
+    if (disparity < least_disparity_px || disparity > most_disparity_px) continue;
+    if (std::abs(there[i].y - corners[i].y) > kMostRowOffset_px) continue;
+    kept.push_back(i);
+    rows.push_back(there[i].y - corners[i].y);
+  }
+  seeds.row_offset_px = median(rows);
+  for (size_t k = 0; k < kept.size(); ++k)
+    if (std::abs(rows[k] - static_cast<float>(seeds.row_offset_px)) < kMostRowScatter_px)
+      seeds.matches.push_back({corners[kept[k]], corners[kept[k]].x - there[kept[k]].x});
+  return seeds;
+}
+
+}  // namespace palpate

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "palpate/stereo/eyes.h"
+
+namespace palpate {
+
+/// A corner of the left image found again in the right one.
+struct Seed {
+  cv::Point2f left_px;
+  float disparity_px = 0;
+};
+
+struct Seeds {
+  std::vector<Seed> matches;
+  int corners = 0;           ///< looked for
+  double row_offset_px = 0;  ///< median of right row minus left row
+};
+
+/// Corners matched by pyramidal Lucas-Kanade across the pair, checked both ways, whose disparity lies in
+/// [least, most] px and whose rows agree. A coarse search along the row says where Lucas-Kanade starts.
+Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_disparity_px);
+
+}  // namespace palpate
