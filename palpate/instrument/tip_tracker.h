@@ -21,13 +21,13 @@ void describe(Settings& settings, InstrumentOptions& options);
 /// What one frame says about the tip, left camera frame.
 struct TipObservation {
   bool visible = false;
-  Vec3 tip_mm = Vec3::Zero();                  ///< far end of the jaws; filtered
+  Vec3 tip_mm = Vec3::Zero();  ///< far end of the jaws; filtered
   Mat3 covariance_mm2 = Mat3::Identity();
   Vec3 velocity_mm_per_s = Vec3::Zero();
-  std::optional<Vec3> since_mark_mm;           ///< displacement since `mark`, better known than the tip itself
+  std::optional<Vec3> since_mark_mm;  ///< displacement since `mark`, better known than the tip itself
   Mat3 since_mark_covariance_mm2 = Mat3::Identity();
-  std::optional<bool> closed;                  ///< jaws hold, where a tip track says so
-  cv::Mat left_mask;                           ///< 255 = instrument, rectified left image; empty with a tip track
+  std::optional<bool> closed;  ///< jaws hold, where a tip track says so
+  cv::Mat left_mask;           ///< 255 = instrument, rectified left image; empty with a tip track
   cv::Mat right_mask;
 };
 

@@ -1,0 +1,222 @@
+#include "palpate/instrument/find_tip.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace palpate {
+
+namespace {
+
+/// Everything of an instrument between two neighbouring cross-sections, one pixel thick.
+struct Slice {
+  double low = 1e9;  ///< signed distances of its edges from the axis, px
+  double high = -1e9;
+  int pixels = 0;
+  bool cut = false;  ///< ends at the border of the picture, so its edges are not the instrument's
+  double width() const { return high - low + 1; }
+};
+
+struct EdgeLine {
+  double offset = 0;
+  double slope = 0;
+  double deviation = 0;  ///< robust, of the edge points that were used, px
+};
+
+constexpr int kLeastPixels = 60;
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Pixels of the picture that have the outside for a neighbour.
+cv::Mat picture_border(const cv::Size& size, const cv::Mat& picture_area) {
+  cv::Mat inside = cv::Mat::zeros(size, CV_8U);
+  inside(cv::Rect(2, 2, size.width - 4, size.height - 4)) = 255;
+  if (!picture_area.empty()) {
+    cv::Mat eroded;
+    cv::erode(picture_area, eroded, cv::Mat::ones(5, 5, CV_8U));
+    inside &= eroded;
+  }
+  return inside == 0;
+}
+
+std::vector<Slice> slices_along(const std::vector<cv::Point>& pixels, const cv::Mat& border, const cv::Point2d& origin,
+                                const cv::Point2d& axis, double& first) {
+  double least = 1e9, most = -1e9;
+  for (const cv::Point& p : pixels) {
+    const double s = (p.x - origin.x) * axis.x + (p.y - origin.y) * axis.y;
+    least = std::min(least, s);
+    most = std::max(most, s);
+  }
+  first = least;
+  std::vector<Slice> slices(static_cast<size_t>(most - least) + 1);
+  for (const cv::Point& p : pixels) {
+    const double s = (p.x - origin.x) * axis.x + (p.y - origin.y) * axis.y;
+    const double t = (p.y - origin.y) * axis.x - (p.x - origin.x) * axis.y;
+    Slice& slice = slices[static_cast<size_t>(s - least)];
+    slice.low = std::min(slice.low, t);
+    slice.high = std::max(slice.high, t);
+    ++slice.pixels;
+    if (border.at<uchar>(p)) slice.cut = true;
+  }
+  return slices;
+}
+
+/// Straight line through an edge, by iteratively reweighted least squares (Tukey).
+EdgeLine fit_edge(const std::vector<double>& s, const std::vector<double>& t) {
+  EdgeLine line;
+  std::vector<double> residual(s.size());
+  line.offset = median_of(t);
+  for (int pass = 0; pass < 8; ++pass) {
+    for (size_t i = 0; i < s.size(); ++i) residual[i] = std::abs(t[i] - line.offset - line.slope * s[i]);
+    line.deviation = 1.48 * median_of(residual);
+    const double limit = 4.7 * std::max(line.deviation, 0.5);
+    double w0 = 0, ws = 0, wss = 0, wt = 0, wst = 0;
+    for (size_t i = 0; i < s.size(); ++i) {
+      const double ratio = residual[i] / limit;
+      if (ratio >= 1) continue;
+      const double w = (1 - ratio * ratio) * (1 - ratio * ratio);
+      w0 += w, ws += w * s[i], wss += w * s[i] * s[i], wt += w * t[i], wst += w * s[i] * t[i];
+    }
+    const double determinant = w0 * wss - ws * ws;
+    if (determinant < 1e-9) break;
+    line.slope = (w0 * wst - ws * wt) / determinant;
+    line.offset = (wt - line.slope * ws) / w0;
+  }
+  return line;
+}
+
+struct Shaft {
+  EdgeLine low, high;
+  double width = 0;
+  int slices = 0;
+  double filled = 0;  ///< share of the pixels between the edges that belong to the mask
+};
+
+Shaft fit_shaft(const std::vector<Slice>& slices) {
+  Shaft shaft;
+  std::vector<double> widths;
+  for (const Slice& slice : slices)
+    if (slice.pixels > 0 && !slice.cut) widths.push_back(slice.width());
+  if (widths.size() < 8) return shaft;
+  std::nth_element(widths.begin(), widths.begin() + static_cast<std::ptrdiff_t>(widths.size() * 3 / 4), widths.end());
+  const double full_width = widths[widths.size() * 3 / 4];
+
+  std::vector<double> s, low, high, width;
+  double area = 0, pixels = 0;
+  for (size_t i = 0; i < slices.size(); ++i) {
+    const Slice& slice = slices[i];
+    if (slice.pixels == 0 || slice.cut || slice.width() < 0.5 * full_width) continue;
+    s.push_back(static_cast<double>(i));
+    low.push_back(slice.low);
+    high.push_back(slice.high);
+    width.push_back(slice.width());
+    area += slice.width();
+    pixels += slice.pixels;
+  }
+  if (s.size() < 8) return shaft;
+  shaft.low = fit_edge(s, low);
+  shaft.high = fit_edge(s, high);
+  shaft.width = median_of(width);
+  shaft.slices = static_cast<int>(s.size());
+  shaft.filled = pixels / area;
+  return shaft;
+}
+
+bool looks_like_an_instrument(const Shaft& shaft, double length) {
+  const double width = shaft.width;
+  if (width < 3 || shaft.slices < 0.6 * width || length < 1.3 * width) return false;
+  const double straightness = std::max(1.5, 0.09 * width);
+  return shaft.low.deviation < straightness && shaft.high.deviation < straightness &&
+         std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.85;
+}
+
+/// The far end in coordinates along and across the axis.
+cv::Point2d far_end(const std::vector<Slice>& slices, double first, double width) {
+  // An end that is only a pixel or two thick is noise of the mask: the tip begins where the slices carry a jaw.
+  const double least_pixels = std::max(2.0, 0.06 * width);
+  size_t last = slices.size() - 1;
+  while (last > 0 && slices[last].pixels < least_pixels) --last;
+  double beyond = 0;  // the partly filled slice before the first full one, for sub-pixel precision
+  if (last + 1 < slices.size()) beyond = std::min(1.0, slices[last + 1].pixels / least_pixels);
+  double across = 0, weight = 0;
+  const size_t depth = static_cast<size_t>(std::max(3.0, 0.15 * width));
+  for (size_t i = last; i + depth > last && i > 0; --i) {
+    if (slices[i].pixels == 0) continue;
+    across += 0.5 * (slices[i].low + slices[i].high);
+    weight += 1;
+  }
+  return {first + static_cast<double>(last) + beyond, weight > 0 ? across / weight : 0.0};
+}
+
+std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border) {
+  cv::Point2d entry(0, 0);
+  int entering = 0;
+  for (const cv::Point& p : pixels) {
+    if (!border.at<uchar>(p)) continue;
+    entry += cv::Point2d(p);
+    ++entering;
+  }
+  if (entering == 0) return {};
+  entry *= 1.0 / entering;
+
+  cv::Point2d axis(0, 0);
+  double farthest = 0;
+  for (const cv::Point& p : pixels) {
+    const cv::Point2d away = cv::Point2d(p) - entry;
+    if (const double distance = std::hypot(away.x, away.y); distance > farthest) farthest = distance, axis = away;
+  }
+  if (farthest < 8) return {};
+  axis *= 1 / farthest;
+
+  double first = 0;
+  Shaft shaft;
+  std::vector<Slice> slices;
+  for (int pass = 0; pass < 3; ++pass) {
+    slices = slices_along(pixels, border, entry, axis, first);
+    shaft = fit_shaft(slices);
+    if (shaft.slices == 0) return {};
+    if (pass == 2) break;
+    const double turn = std::atan(0.5 * (shaft.low.slope + shaft.high.slope));
+    axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
+                       axis.x * std::sin(turn) + axis.y * std::cos(turn));
+  }
+  if (!looks_like_an_instrument(shaft, farthest)) return {};
+
+  const cv::Point2d end = far_end(slices, first, shaft.width);
+  ImageTip tip;
+  tip.axis = axis;
+  tip.width_px = shaft.width;
+  tip.tip_px = entry + end.x * axis + end.y * cv::Point2d(-axis.y, axis.x);
+  return tip;
+}
+
+}  // namespace
+
+std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
+  const cv::Rect box = cv::boundingRect(instrument_mask);
+  if (box.area() < kLeastPixels) return {};
+  const cv::Mat border = picture_border(instrument_mask.size(), picture_area)(box);
+  cv::Mat labels, stats, centres;
+  const int count = cv::connectedComponentsWithStats(instrument_mask(box), labels, stats, centres, 8);
+  std::vector<int> by_size;
+  for (int i = 1; i < count; ++i)
+    if (stats.at<int>(i, cv::CC_STAT_AREA) >= kLeastPixels) by_size.push_back(i);
+  std::sort(by_size.begin(), by_size.end(),
+            [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
+  for (int label : by_size) {
+    std::vector<cv::Point> pixels;
+    cv::findNonZero(labels == label, pixels);
+    if (auto tip = tip_of_component(pixels, border)) {
+      tip->tip_px += cv::Point2d(box.tl());
+      return tip;
+    }
+  }
+  return {};
+}
+
+}  // namespace palpate

@@ -1,0 +1,92 @@
+#include "palpate/instrument/instrument_plane.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+namespace palpate {
+
+namespace {
+
+using Vector4 = Eigen::Vector4d;  // disparity at the tip, slope in x, slope in y, row offset
+using Matrix4 = Eigen::Matrix4d;
+
+constexpr double kSlopeDeviation = 0.05;  // px/px; a shaft that halves its depth over the image has 0.05
+constexpr double kRowDeviation_px = 0.5;  // left by a good calibration
+constexpr double kLeastAgreement = 0.35;
+constexpr double kCorrelatedNoise = 12;  // pixels that share one noise sample after smoothing and video coding
+
+struct System {
+  Matrix4 normal = Matrix4::Zero();
+  Vector4 right = Vector4::Zero();
+  double information = 0, full_information = 0, squared_error = 0, weight = 0;
+  double agreement() const { return full_information > 0 ? information / full_information : 0; }
+};
+
+CellWarp warp_cell(const cv::Point2d& center, const cv::Point2d& tip, const Vector4& p) {
+  CellWarp warp;
+  const double d = p[0] + p[1] * (center.x - tip.x) + p[2] * (center.y - tip.y);
+  warp.center_px = {center.x - d, center.y + p[3]};
+  warp.linear = {1 - p[1], -p[2], 0, 1};
+  return warp;
+}
+
+System assemble(const std::vector<PatchCell>& cells, const cv::Point2d& tip, const ImageLayers& right, int level,
+                const Vector4& p) {
+  System system;
+  for (const PatchCell& cell : cells) {
+    const CellEquations e = cell_equations(cell, right, level, warp_cell(cell.center_px, tip, p));
+    Eigen::Matrix<double, 2, 4> jacobian;
+    jacobian << -1, -(cell.center_px.x - tip.x), -(cell.center_px.y - tip.y), 0, 0, 0, 0, 1;
+    system.normal += jacobian.transpose() * e.normal * jacobian;
+    system.right += jacobian.transpose() * e.right;
+    system.information += e.information;
+    system.full_information += e.full_information;
+    system.squared_error += e.squared_error;
+    system.weight += e.weight;
+  }
+  return system;
+}
+
+/// Best disparity of a coarse search along the row, where Gauss-Newton alone could settle on the wrong edge.
+double search_disparity(const PatchTemplate& left, const cv::Point2d& tip, const ImageLayers& right, double guess) {
+  const int level = ImageLayers::kLevels - 1;
+  double best = guess, best_agreement = -1;
+  for (double d = guess - 12; d <= guess + 12; d += 2) {
+    const System system = assemble(left.cells[level], tip, right, level, Vector4(d, 0, 0, 0));
+    if (system.agreement() > best_agreement) best_agreement = system.agreement(), best = d;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const cv::Point2d& tip_px,
+                                                const ImageLayers& right, double guess_px) {
+  Vector4 p(search_disparity(left, tip_px, right, guess_px), 0, 0, 0);
+  Matrix4 prior = Matrix4::Zero();
+  System system;
+  for (int level = ImageLayers::kLevels - 1; level >= 0; --level) {
+    const auto& cells = left.cells[static_cast<size_t>(level)];
+    for (int pass = 0; pass < 8; ++pass) {
+      system = assemble(cells, tip_px, right, level, p);
+      prior.diagonal() << 0, 1 / std::pow(kSlopeDeviation, 2), 1 / std::pow(kSlopeDeviation, 2),
+          1 / std::pow(kRowDeviation_px, 2);
+      prior *= kCorrelatedNoise;
+      const Matrix4 normal = system.normal + prior + 1e-6 * Matrix4::Identity();
+      const Vector4 step = normal.ldlt().solve(system.right - prior * p);
+      p += step;
+      if (std::abs(step[0]) < 0.003 && std::abs(step[3]) < 0.003) break;
+    }
+  }
+  if (system.agreement() < kLeastAgreement || !(p[0] > 0.5)) return {};
+  InstrumentPlane plane;
+  plane.origin_px = tip_px;
+  plane.disparity = p.head<3>();
+  plane.row_offset_px = p[3];
+  plane.agreement = system.agreement();
+  const double noise = std::max(1.0, system.squared_error / std::max(system.weight, 1.0));
+  plane.disparity_deviation_px = std::sqrt(kCorrelatedNoise * noise * (system.normal + prior).inverse()(0, 0));
+  return plane;
+}
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "palpate/core/geometry.h"
+#include "palpate/instrument/find_tip.h"
+#include "palpate/instrument/segment.h"
+
+namespace palpate {
+
+/// Part of one eye's image, smoothed, ready to be aligned: brightness follows the texture inside the instrument, and
+/// metalness its outline, whatever the background does behind it. Two pyramid levels; float, grey levels 0..255.
+struct ImageLayers {
+  static constexpr int kLevels = 3;
+  cv::Rect region;  ///< of the full image
+  std::array<cv::Mat, kLevels> brightness;
+  std::array<cv::Mat, kLevels> metal;
+};
+
+ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const SegmentationModel& model);
+
+/// One pixel of a template, relative to the centre of its cell, px of the full image.
+struct CellSample {
+  float dx, dy;
+  float value;
+  float gradient_x, gradient_y;
+  bool outline;  ///< value is metalness, otherwise brightness
+};
+
+/// A few pixels that move together: the unit in which robust weights and brightness offsets are judged.
+struct PatchCell {
+  cv::Point2d center_px;
+  std::vector<CellSample> samples;
+};
+
+/// What one eye saw of the far part of the instrument; one list of cells per pyramid level.
+struct PatchTemplate {
+  std::array<std::vector<PatchCell>, ImageLayers::kLevels> cells;
+};
+
+/// The instrument from its tip back to `length_px` along the axis. Inside the mask the samples are brightness, in a
+/// band around its outline metalness.
+PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, const ImageTip& tip, double length_px);
+
+/// Where a cell goes: its centre, and the linear part of the motion around it.
+struct CellWarp {
+  cv::Point2d center_px;
+  cv::Matx22d linear = cv::Matx22d::eye();
+};
+
+/// Lucas-Kanade's normal equations of one cell for a shift of its centre, with the cell's brightness offset eliminated
+/// and outliers weighted down. Residuals are in units of their expected noise.
+struct CellEquations {
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  double information = 0;       ///< gradient energy that kept its weight
+  double full_information = 0;  ///< gradient energy of the template
+  double squared_error = 0;     ///< robustly weighted
+  double weight = 0;
+};
+
+CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp);
+
+}  // namespace palpate

@@ -1,0 +1,121 @@
+#include "palpate/instrument/rigid_motion.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+namespace palpate {
+
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;  // translation of the tip, rotation about it
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double kRotationDeviation_rad = 0.02;  // an instrument in a trocar mostly translates
+constexpr double kLeastAgreement = 0.35;
+constexpr double kCorrelatedNoise = 12;
+
+struct System {
+  Matrix6 normal = Matrix6::Zero();
+  Vector6 right = Vector6::Zero();
+  double information = 0, full_information = 0, squared_error = 0, weight = 0;
+  double agreement() const { return full_information > 0 ? information / full_information : 0; }
+};
+
+/// Where one eye sees the instrument; `shift_mm` is the eye's place along the baseline.
+struct Eye {
+  const Rectification& rectification;
+  double shift_mm;
+
+  Vec3 point(const InstrumentPlane& plane, const cv::Point2d& px) const {
+    const double f = rectification.focal_px;
+    double disparity = plane.disparity_at(px);
+    double left_x = px.x;
+    if (shift_mm > 0) {  // the plane is given in left pixels: x_left = x_right + d(x_left, y)
+      disparity = plane.disparity_at(px) / (1 - plane.disparity[1]);
+      left_x += disparity;
+    }
+    const double z = f * rectification.baseline_mm / std::max(disparity, 0.1);
+    return {(left_x - rectification.principal_x_px) * z / f, (px.y - rectification.principal_y_px) * z / f, z};
+  }
+
+  cv::Point2d project(const Vec3& p) const {
+    const double f = rectification.focal_px;
+    return {f * (p.x() - shift_mm) / p.z() + rectification.principal_x_px,
+            f * p.y() / p.z() + rectification.principal_y_px};
+  }
+};
+
+Vec3 moved(const Vec3& point, const Vec3& tip, const Vector6& p) {
+  return point + p.head<3>() + p.tail<3>().cross(point - tip);
+}
+
+void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
+             const ImageLayers& layers, int level, const Vector6& p, System& system) {
+  const double f = eye.rectification.focal_px;
+  for (const PatchCell& cell : cells) {
+    const Vec3 before = eye.point(keyframe.plane, cell.center_px);
+    const Vec3 now = moved(before, keyframe.tip_mm, p);
+    if (now.z() < 5) continue;
+    const auto goes_to = [&](const cv::Point2d& px) {
+      const Vec3 x = eye.point(keyframe.plane, px);
+      return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x);
+    };
+    CellWarp warp;
+    warp.center_px = goes_to(cell.center_px);
+    const cv::Point2d along_x = goes_to(cell.center_px + cv::Point2d(4, 0)) - warp.center_px;
+    const cv::Point2d along_y = goes_to(cell.center_px + cv::Point2d(0, 4)) - warp.center_px;
+    warp.linear = {along_x.x / 4, along_y.x / 4, along_x.y / 4, along_y.y / 4};
+
+    const CellEquations e = cell_equations(cell, layers, level, warp);
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << f / now.z(), 0, -f * (now.x() - eye.shift_mm) / (now.z() * now.z()), 0, f / now.z(),
+        -f * now.y() / (now.z() * now.z());
+    const Vec3 arm = before - keyframe.tip_mm;
+    Mat3 turning;  // d(omega x arm) / d omega
+    turning << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+    Eigen::Matrix<double, 2, 6> jacobian;
+    jacobian << projection, projection * turning;
+    system.normal += jacobian.transpose() * e.normal * jacobian;
+    system.right += jacobian.transpose() * e.right;
+    system.information += e.information;
+    system.full_information += e.full_information;
+    system.squared_error += e.squared_error;
+    system.weight += e.weight;
+  }
+}
+
+}  // namespace
+
+std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, const ImageLayers& left,
+                                          const ImageLayers& right, const Rectification& rectification,
+                                          const RigidMotion& guess) {
+  if (left.region.area() == 0 || right.region.area() == 0) return {};
+  const Eye left_eye{rectification, 0}, right_eye{rectification, rectification.baseline_mm};
+  Vector6 p;
+  p << guess.translation_mm, guess.rotation_rad;
+  Matrix6 prior = Matrix6::Zero();
+  prior.diagonal().tail<3>().setConstant(kCorrelatedNoise / std::pow(kRotationDeviation_rad, 2));
+  System system;
+  for (int level = ImageLayers::kLevels - 1; level >= 0; --level)
+    for (int pass = 0; pass < 8; ++pass) {
+      system = System();
+      add_eye(keyframe.left.cells[static_cast<size_t>(level)], left_eye, keyframe, left, level, p, system);
+      add_eye(keyframe.right.cells[static_cast<size_t>(level)], right_eye, keyframe, right, level, p, system);
+      const Matrix6 normal = system.normal + prior + 1e-6 * Matrix6::Identity();
+      const Vector6 step = normal.ldlt().solve(system.right - prior * p);
+      p += step;
+      if (!p.allFinite()) return {};
+      if (step.head<3>().norm() < 0.002) break;
+    }
+  if (system.agreement() < kLeastAgreement) return {};
+  RigidMotion motion;
+  motion.translation_mm = p.head<3>();
+  motion.rotation_rad = p.tail<3>();
+  motion.agreement = system.agreement();
+  const double noise = std::max(1.0, system.squared_error / std::max(system.weight, 1.0));
+  motion.covariance_mm2 = kCorrelatedNoise * noise * (system.normal + prior).inverse().topLeftCorner<3, 3>();
+  return motion;
+}
+
+}  // namespace palpate
