@@ -41,13 +41,14 @@ struct MapReport {
 
 /// V of Eq. 1 and everything seen on the way to it.
 struct TissueMap {
-  PointCloud cloud;      ///< S
-  Surface surface;       ///< S*
-  TetMesh mesh;          ///< V
+  PointCloud cloud;              ///< S
+  Surface surface;               ///< S*
+  TetMesh mesh;                  ///< V
   std::vector<int> fixed_nodes;  ///< b
-  TissueOptions tissue;  ///< gamma
+  TissueOptions tissue;          ///< gamma
   DisparityMap disparity;
-  cv::Mat organ_mask;    ///< 255 = organ region, rectified left image
+  cv::Mat organ_mask;  ///< 255 = organ region, rectified left image
+  int frame = 0;       ///< the static frame
   MapReport report;
 };
 

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <chrono>
+
+namespace palpate {
+
+class Stopwatch {
+ public:
+  /// Milliseconds since the last call (since the start, the first time).
+  double lap_ms() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace palpate

@@ -1,0 +1,187 @@
+#include "palpate/estimate/force_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "palpate/contact/detect.h"
+#include "palpate/contact/follow.h"
+#include "palpate/contact/held_contact.h"
+#include "palpate/contact/onset.h"
+#include "palpate/contact/tissue_motion.h"
+#include "palpate/core/stopwatch.h"
+#include "palpate/elastic/stress.h"
+
+namespace palpate {
+
+namespace {
+
+/// Frames without the tip after which a held contact is given up.
+constexpr int kMostLostFrames = 5;
+/// Elements around the footprint are split until their edges are this share of its radius.
+constexpr double kFootprintEdgeShare = 0.5;
+constexpr double kFootprintReach = 1.5;
+/// The ring of tissue watched around a contact, in footprint radii and at least so wide.
+constexpr double kWatchedRadii = 3.5;
+constexpr double kLeastWatched_mm = 8;
+/// Saint Venant-Kirchhoff softens in compression below a stretch of about 0.58 (volume ratio of uniaxial strain).
+constexpr double kLeastVolumeRatio = 0.58;
+constexpr double kStaleMisfit_mm = 3;
+
+std::vector<Vec3> deformed(const TetModel& model, const Eigen::VectorXd& u) {
+  std::vector<Vec3> nodes = model.rest_mm();
+  for (size_t n = 0; n < nodes.size(); ++n) nodes[n] += u.segment<3>(3 * static_cast<Eigen::Index>(n));
+  return nodes;
+}
+
+}  // namespace
+
+struct ForceEstimator::State {
+  TissueMap map;
+  std::vector<Triangle> boundary;
+  Rectification rectification;
+  AttachmentOptions attachments;
+  ContactOptions options;
+  TipTracker tracker;
+  OnsetDetector onset;
+  TissueMotion tissue_motion;
+  std::optional<HeldContact> held;
+  Vec3 onset_tip_mm = Vec3::Zero();
+  int lost_frames = 0;
+
+  State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
+        const InstrumentOptions& instrument, const ContactOptions& contact)
+      : map(std::move(m)),
+        boundary(boundary_triangles(map.mesh)),
+        rectification(r),
+        attachments(a),
+        options(contact),
+        tracker(instrument, rectification, rectify(rectification, static_frame), map.organ_mask),
+        onset(contact.threshold_mm),
+        tissue_motion(rectification) {}
+
+  void begin_contact(const RectifiedPair& pair, const TipObservation& tip, const Gap& gap) {
+    const double radius_mm = options.footprint_radius_mm;
+    const TetMesh refined =
+        refine_near(map.mesh, gap.surface_point_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
+    const std::vector<int> fixed = select_attachments(
+        refined, attachments, [this](const Vec3& point) { return project_to_recorded_left(rectification.rig, point); });
+    held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options);
+    onset_tip_mm = tip.tip_mm;
+    tracker.mark();
+    tissue_motion.start(pair, tip.left_mask, gap.surface_point_mm,
+                        std::max(kLeastWatched_mm, kWatchedRadii * radius_mm));
+  }
+
+  void end_contact() {
+    held.reset();
+    tracker.unmark();
+    tissue_motion.stop();
+    onset.reset();
+  }
+
+  /// Where the free tip stands against the map at rest, and whether it begins to touch (Eq. 4).
+  void look_for_contact(const RectifiedPair& pair, const TipObservation& tip) {
+    const Gap gap = gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary);
+    const double deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
+    const bool touches = onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
+    if (touches && tip.closed.value_or(true)) begin_contact(pair, tip, gap);
+  }
+
+  /// u, lambda of Eq. 3 for the tip's displacement since onset; ends the contact when the image or the grip says so.
+  std::optional<Equilibrium> solve_contact(const RectifiedPair& pair, const TipObservation& tip,
+                                           ForceEstimate& estimate) {
+    if (tip.closed && !*tip.closed) {
+      end_contact();
+      return std::nullopt;
+    }
+    const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);
+    estimate.tip_mm = held->footprint().center_mm + p;
+    const HeldContact::Answer answer = held->move(p);
+    if (answer.let_go) {
+      estimate.tip_mm = tip.tip_mm;
+      end_contact();
+      return std::nullopt;
+    }
+    const std::vector<TissuePoint> seen = tissue_motion.update(pair, tip.left_mask, tip.right_mask);
+    std::vector<Vec3> rest;
+    for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
+    const Follow follow =
+        compare_motion(seen, displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest));
+    if (follow.let_go) {
+      estimate.tip_mm = tip.tip_mm;
+      end_contact();
+      return std::nullopt;
+    }
+    estimate.misfit_mm = follow.misfit_mm;
+    if (answer.slid) estimate.warnings.push_back("sliding");
+    return answer.equilibrium;
+  }
+
+  void report(const Equilibrium& equilibrium, ForceEstimate& estimate) const {
+    estimate.in_contact = true;
+    estimate.residual = equilibrium.residual;
+    estimate.status = FrameStatus::not_converged;
+    if (held->near_attachment()) estimate.warnings.push_back("near_attachment");
+    if (equilibrium.smallest_volume_ratio < kLeastVolumeRatio) estimate.warnings.push_back("law_out_of_range");
+    if (!equilibrium.converged || equilibrium.smallest_volume_ratio <= 0) return;
+    estimate.status = estimate.misfit_mm > kStaleMisfit_mm ? FrameStatus::map_stale : FrameStatus::ok;
+    estimate.force_N = equilibrium.force_N;
+    estimate.mean_nodal_force_N = equilibrium.mean_nodal_force_N;
+    estimate.deformed_nodes_mm = deformed(held->model(), equilibrium.u);
+    estimate.boundary = held->boundary();
+  }
+};
+
+ForceEstimator::ForceEstimator(TissueMap map, const StereoFrame& static_frame, const Rectification& rectification,
+                               const AttachmentOptions& attachments, const InstrumentOptions& instrument,
+                               const ContactOptions& contact)
+    : state_(std::make_unique<State>(std::move(map), static_frame, rectification, attachments, instrument, contact)) {}
+ForceEstimator::~ForceEstimator() = default;
+ForceEstimator::ForceEstimator(ForceEstimator&&) noexcept = default;
+
+const TissueMap& ForceEstimator::map() const {
+  return state_->map;
+}
+
+ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
+  State& s = *state_;
+  ForceEstimate estimate;
+  estimate.frame = frame.index;
+  estimate.time_s = frame.time_s;
+  Stopwatch watch;
+
+  const RectifiedPair pair = rectify(s.rectification, frame);
+  estimate.times.rectify_ms = watch.lap_ms();
+
+  const TipObservation tip = s.tracker.update(pair);
+  estimate.left_instrument_mask = tip.left_mask;
+  estimate.times.track_ms = watch.lap_ms();
+
+  if (!tip.visible) {
+    estimate.status = FrameStatus::tool_lost;
+    if (s.held && ++s.lost_frames > kMostLostFrames) s.end_contact();
+    if (!s.held) s.onset.reset();
+    return estimate;
+  }
+  s.lost_frames = 0;
+  estimate.tip_mm = tip.tip_mm;
+
+  if (!s.held && frame.index > s.map.frame) s.look_for_contact(pair, tip);
+  estimate.times.contact_ms = watch.lap_ms();
+  if (!s.held) return estimate;
+
+  const auto equilibrium = s.solve_contact(pair, tip, estimate);
+  estimate.times.solve_ms = watch.lap_ms();
+  if (!equilibrium) return estimate;
+
+  s.report(*equilibrium, estimate);
+  if (estimate.status == FrameStatus::not_converged) return estimate;
+  estimate.node_von_mises_kPa = node_von_mises_kPa(s.held->model(), equilibrium->u);
+  estimate.max_von_mises_kPa =
+      *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
+  estimate.times.stress_ms = watch.lap_ms();
+  return estimate;
+}
+
+}  // namespace palpate

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+
+#include "palpate/contact/contact_options.h"
+#include "palpate/estimate/force_estimate.h"
+#include "palpate/estimate/tissue_map.h"
+#include "palpate/instrument/tip_tracker.h"
+
+namespace palpate {
+
+/// COMPUTE, the second stage: every frame from two images to a force. Keeps the map, the tracker and the contact
+/// between frames.
+class ForceEstimator {
+ public:
+  /// `static_frame`: the frame that the map was built from. `attachments`: as the map was built with.
+  ForceEstimator(TissueMap map, const StereoFrame& static_frame, const Rectification& rectification,
+                 const AttachmentOptions& attachments, const InstrumentOptions& instrument,
+                 const ContactOptions& contact);
+  ~ForceEstimator();
+  ForceEstimator(ForceEstimator&&) noexcept;
+
+  /// Frames in order of time. Never throws for a bad frame: the status says what happened.
+  ForceEstimate update(const StereoFrame& frame);
+
+  const TissueMap& map() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,39 @@
+#include "palpate/estimate/scene.h"
+
+#include "palpate/core/errors.h"
+
+namespace palpate {
+
+void describe(Settings& settings, MapOptions& options) {
+  settings.integer("frame", options.frame, {0, 1e9}, "the static frame that the map is built from, counted from 0");
+  settings.integer("elements", options.elements, {100, 200000}, "n of Eq. 1, tetrahedra wanted");
+  settings.polygon("organ_region_px", options.organ_region_px,
+                   "outline of the organ in the left image as recorded; everything when left out");
+  settings.number("thickness_mm", options.thickness_mm, {0, 500, true, false},
+                  "depth of the body behind its visible surface, along the optical axis");
+  settings.path("volume", options.volume,
+                "instead of the thickness: the organ from a scan (.msh .vtk .vtu .obj .ply .stl), left camera frame");
+  settings.choice<LengthUnit>("volume_unit", options.volume_unit, {{"mm", LengthUnit::mm}, {"m", LengthUnit::m}},
+                              "unit of length of that file");
+  describe(settings, options.match);
+  describe(settings, options.surface);
+}
+
+void describe(Settings& settings, Scene& scene, bool with_recording) {
+  if (with_recording) {
+    settings.group("recording", "the two videos and their calibration",
+                   [&scene](Settings& group) { describe(group, scene.recording); });
+    settings.require("recording");
+  }
+  settings.group("map", "the build stage", [&scene](Settings& group) { describe(group, scene.map); });
+  settings.group("tissue", "gamma of Eq. 1: law and constants",
+                 [&scene](Settings& group) { describe(group, scene.tissue); });
+  settings.require("tissue");
+  describe(settings, scene.attachments);
+  settings.group("instrument", "how the tip is found",
+                 [&scene](Settings& group) { describe(group, scene.instrument); });
+  settings.group("contact", "when and how the tip holds the tissue",
+                 [&scene](Settings& group) { describe(group, scene.contact); });
+}
+
+}  // namespace palpate
