@@ -192,11 +192,12 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
   });
 }
 
-/// The lowest colours of a map are too dark for lines and text: only its upper part is used.
+/// The ends of a map that are too dark for lines and text are left out.
 cv::Scalar OverlayPainter::force_colour(const ForceEstimate& estimate) const {
   if (estimate.status == FrameStatus::map_stale || estimate.status == FrameStatus::not_converged) return kDoubt;
   const double share = nodal_force_scale_N_ > 0 ? estimate.mean_nodal_force_N / nodal_force_scale_N_ : 0;
-  return colour_at(colours_, 0.45 + 0.55 * share);
+  return options_.colour_map == ColourMap::jet ? colour_at(colours_, 0.35 + 0.5 * share)
+                                               : colour_at(colours_, 0.45 + 0.55 * share);
 }
 
 void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) const {

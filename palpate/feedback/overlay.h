@@ -18,7 +18,7 @@ struct OverlayOptions {
       OverlayRegion::whole;  ///< stress on the whole organ (Fig. 4) or around the instrument (Fig. 5)
   double radius_mm = 15;     ///< of `around`
   ColourMap colour_map = ColourMap::viridis;
-  double opacity = 0.75;        ///< of the highest stress; less stress is more transparent, no stress leaves the tissue
+  double opacity = 0.65;        ///< of the highest stress; less stress is more transparent, no stress leaves the tissue
   double stress_scale_kPa = 0;  ///< end of the colour bar; 0 = follows the highest stress in round steps
   bool chart = true;            ///< force over time
   double chart_duration_s = 10;  ///< shown by the chart

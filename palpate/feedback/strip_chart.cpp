@@ -22,20 +22,21 @@ void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& co
   const auto px = [scale](double size) { return cvRound(size * scale); };
   const cv::Rect plot(area.x + px(38), area.y + px(24), area.width - px(54), area.height - px(46));
   draw_text(image, "force (N)", {area.x + px(8), area.y + px(15)}, text_px, kInk);
-  draw_text(image, "time (s)", {area.br().x - px(8), area.y + px(15)}, text_px, kFaintInk, TextAnchor::right);
 
   const double first_s = samples_.empty() ? 0 : std::max(samples_.front().time_s, samples_.back().time_s - duration_s_);
   const auto x_of = [&](double time_s) { return plot.x + (time_s - first_s) / duration_s_ * plot.width; };
   const auto y_of = [&](double force_N) { return plot.br().y - force_N / most_N_ * plot.height; };
-  for (const double tick : round_ticks(0, most_N_, 4)) {
+  for (const double tick : round_ticks(0, most_N_, static_cast<int>(plot.height / (2.5 * text_px)))) {
     const int y = cvRound(y_of(tick));
     cv::line(image, {plot.x, y}, {plot.br().x, y}, cv::Scalar::all(tick > 0 ? 90 : 190));
     draw_text(image, tick_text(tick), {plot.x - px(5), y + cvRound(text_px / 2)}, text_px, kInk, TextAnchor::right);
   }
-  for (const double tick : round_ticks(first_s, first_s + duration_s_, 5)) {
+  const std::vector<double> ticks_s = round_ticks(first_s, first_s + duration_s_, 5);
+  for (const double tick : ticks_s) {
     const int x = cvRound(x_of(tick));
     cv::line(image, {x, plot.br().y}, {x, plot.br().y + px(4)}, kInk);
-    draw_text(image, tick_text(tick), {x, plot.br().y + px(15)}, text_px, kInk, TextAnchor::centre);
+    draw_text(image, tick_text(tick) + (tick == ticks_s.back() ? " s" : ""), {x, plot.br().y + px(15)}, text_px, kInk,
+              TextAnchor::centre);
   }
 
   constexpr int kFractionBits = 4;  // sub-pixel coordinates of cv::line

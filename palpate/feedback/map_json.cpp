@@ -1,0 +1,37 @@
+#include "palpate/feedback/map_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace palpate {
+
+std::string map_json(const TissueMap& map, const Rectification& rectification) {
+  const MapReport& r = map.report;
+  nlohmann::ordered_json json;
+  json["counts"] = {{"matched_points", r.matched_points},
+                    {"cloud_points", map.cloud.size()},
+                    {"surface_vertices", map.surface.vertices_mm.size()},
+                    {"surface_triangles", map.surface.triangles.size()},
+                    {"nodes", map.mesh.nodes_mm.size()},
+                    {"elements", map.mesh.tetrahedra.size()},
+                    {"fixed_nodes", map.fixed_nodes.size()}};
+  json["times_ms"] = {
+      {"rectify", r.rectify_ms}, {"match", r.match_ms},   {"triangulate", r.triangulate_ms}, {"clean", r.clean_ms},
+      {"surface", r.surface_ms}, {"volume", r.volume_ms}, {"attachments", r.attachments_ms}};
+  json["coverage"] = r.coverage;
+  json["median_depth_deviation_mm"] = r.median_depth_deviation_mm;
+  json["smallest_dihedral_deg"] = r.mesh.smallest_dihedral_deg;
+  json["cell_size_mm"] = r.mesh.cell_size_mm;
+  json["tissue"] = {{"law", law_name(map.tissue.law)},
+                    {"young_modulus_kPa", map.tissue.young_modulus_kPa},
+                    {"poisson_ratio", map.tissue.poisson_ratio}};
+  json["focal_px"] = rectification.focal_px;
+  json["baseline_mm"] = rectification.baseline_mm;
+  for (int i = 0; i < 3; ++i) {
+    const auto row = rectification.rectified_from_left.row(i);
+    json["rectified_from_left"].push_back({row[0], row[1], row[2]});
+  }
+  return json.dump(1) + "\n";
+}
+
+}  // namespace palpate
