@@ -82,7 +82,7 @@ void add_jaw(Surface& surface, double shaft_radius, double length, double angle,
 }
 
 Surface grasper(double radius, double opening) {
-  const double jaw = 13, angle = (2.5 + 11 * opening) * kPi / 180;
+  const double jaw = 13, angle = (2.0 + 6 * opening) * kPi / 180;
   Surface surface;
   add_jaw(surface, radius, jaw, angle, 1);
   add_jaw(surface, radius, jaw, angle, -1);

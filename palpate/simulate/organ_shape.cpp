@@ -78,14 +78,14 @@ void fit_to_box(std::vector<Vec3>& points, const Vec3& size) {
   for (Vec3& point : points) point = (point - (least + most) / 2).cwiseProduct(scale);
 }
 
-Mat3 rotation(const Vec3& degrees) {
-  const Vec3 angle = degrees * std::numbers::pi / 180;
+}  // namespace
+
+Mat3 left_from_body(const SimulatedBody& body) {
+  const Vec3 angle = body.rotation_deg * std::numbers::pi / 180;
   return (Eigen::AngleAxisd(angle.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(angle.y(), Vec3::UnitY()) *
           Eigen::AngleAxisd(angle.x(), Vec3::UnitX()))
       .toRotationMatrix();
 }
-
-}  // namespace
 
 Surface make_sphere(int subdivisions) {
   Surface sphere = icosahedron();
@@ -110,7 +110,7 @@ Surface make_organ(const SimulatedBody& body, int least_triangles) {
              : body.shape == "heart" ? heart_point(vertex)
                                      : pear_point(vertex);
   fit_to_box(organ.vertices_mm, body.size_mm);
-  const Mat3 turn = rotation(body.rotation_deg);
+  const Mat3 turn = left_from_body(body);
   for (Vec3& vertex : organ.vertices_mm) vertex = turn * vertex + body.center_mm;
   return organ;
 }

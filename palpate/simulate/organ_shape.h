@@ -9,6 +9,9 @@ namespace palpate {
 /// Throws BadInput when a file cannot be used.
 Surface make_organ(const SimulatedBody& body, int least_triangles);
 
+/// Turn of the body by its `rotation_deg`.
+Mat3 left_from_body(const SimulatedBody& body);
+
 /// Unit sphere by repeated subdivision of an icosahedron.
 Surface make_sphere(int subdivisions);
 

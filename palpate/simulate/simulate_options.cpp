@@ -98,8 +98,8 @@ void describe_gesture_row(Settings& settings, GestureRow& row) {
   settings.number("approach_s", row.approach_s, {0, 60},
                   "come in, free, and touch the tissue at the end of this time, s");
   settings.pixel("at_px", row.at_px, "with approach_s: pixel of the left image at rest where the tissue is touched");
-  settings.number("footprint_radius_mm", row.footprint_radius_mm, {0, 50, true},
-                  "with approach_s: radius of the patch of tissue that the tip holds, mm");
+  settings.number("footprint_radius_mm", row.footprint_radius_mm, {0, 50},
+                  "with approach_s: radius of the patch that the tip holds, 0 = as contact.footprint_radius_mm, mm");
   settings.flag("grasp", row.grasp, "the contact begins");
   settings.vector3(
       "move_mm", row.move_mm, {-100, 100},

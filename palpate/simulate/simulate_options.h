@@ -34,7 +34,7 @@ struct SimulatedLook {
   double texture_mm_per_px = 0.12;               ///< size of a pixel of that image on the tissue
   int seed = 1;
   double roughness = 0.36;  ///< of the wet surface
-  double exposure = 1;
+  double exposure = 0.85;
   SimulatedLight light;
   SimulatedNoise noise;
 };
@@ -60,7 +60,7 @@ struct SimulatedInstrument {
 struct GestureRow {
   double approach_s = 0;
   cv::Point2d at_px;
-  double footprint_radius_mm = 3.5;
+  double footprint_radius_mm = 0;  ///< 0 = as contact.footprint_radius_mm
   bool grasp = false;
   Vec3 move_mm = Vec3::Zero();
   double during_s = 0;

@@ -47,13 +47,13 @@ Texture procedural_tissue(uint32_t seed) {
                       smooth_step(0.05f, 0.4f, gradient_noise(p / 14.0f, seed + 50).value);
 
     Texel texel;
-    Colour colour = mix({0.47f, 0.105f, 0.085f}, {0.62f, 0.21f, 0.17f}, smooth_step(-0.5f, 0.5f, mottle));
-    colour = mix(colour, {0.74f, 0.40f, 0.33f}, 0.75f * pale);
-    colour = mix(colour, {0.80f, 0.58f, 0.36f}, 0.6f * fat);
-    const float small = vessels(p, 9.0f, 0.30f, seed + 60);
-    const float large = vessels(p, 22.0f, 0.85f, seed + 70);
-    colour = mix(colour, {0.22f, 0.020f, 0.022f}, std::max(0.72f * small, 0.85f * large));
-    texel.albedo = colour * std::clamp(1 + 0.26f * grain, 0.4f, 1.6f);
+    Colour colour = mix({0.40f, 0.075f, 0.062f}, {0.55f, 0.15f, 0.12f}, smooth_step(-0.5f, 0.5f, mottle));
+    colour = mix(colour, {0.68f, 0.32f, 0.26f}, 0.7f * pale);
+    colour = mix(colour, {0.74f, 0.47f, 0.27f}, 0.5f * fat);
+    const float small = std::max(vessels(p, 6.0f, 0.30f, seed + 60), vessels(p, 9.0f, 0.45f, seed + 65));
+    const float large = vessels(p, 17.0f, 0.9f, seed + 70);
+    colour = mix(colour, {0.17f, 0.012f, 0.014f}, std::max(0.72f * small, 0.85f * large));
+    texel.albedo = colour * std::clamp(1 + 0.30f * grain, 0.4f, 1.6f);
 
     const FieldValue swell = fractal_noise(p / 5.0f, seed + 80, 2);
     const FieldValue ripple = fractal_noise(p / 1.1f, seed + 90, 2, 0.5f);
@@ -124,10 +124,10 @@ Texture wall_texture(int seed_number) {
     const float broad = fractal_noise(p / 30.0f, seed + 10, 3).value;
     const float mottle = fractal_noise(p / 9.0f, seed + 20, 4, 0.6f).value;
     const float grain = fractal_noise(p / 1.8f, seed + 30, 2, 0.7f).value;
-    Colour colour = mix({0.13f, 0.028f, 0.018f}, {0.26f, 0.085f, 0.045f}, smooth_step(-0.5f, 0.5f, mottle));
-    colour = mix(colour, {0.42f, 0.27f, 0.12f}, 0.65f * smooth_step(0.1f, 0.7f, broad + 0.6f * mottle));
-    const float large = vessels(p, 26.0f, 1.2f, seed + 60), small = vessels(p, 12.0f, 0.5f, seed + 70);
-    colour = mix(colour, {0.10f, 0.008f, 0.008f}, std::max(0.85f * large, 0.6f * small));
+    Colour colour = mix({0.075f, 0.014f, 0.009f}, {0.16f, 0.045f, 0.024f}, smooth_step(-0.5f, 0.5f, mottle));
+    colour = mix(colour, {0.25f, 0.14f, 0.06f}, 0.55f * smooth_step(0.1f, 0.7f, broad + 0.6f * mottle));
+    const float large = vessels(p, 24.0f, 1.6f, seed + 60), small = vessels(p, 11.0f, 0.7f, seed + 70);
+    colour = mix(colour, {0.05f, 0.003f, 0.003f}, std::max(0.9f * large, 0.75f * small));
     Texel texel;
     texel.albedo = colour * std::clamp(1 + 0.35f * grain, 0.3f, 1.7f);
     texel.slope = 0.5f * fractal_noise(p / 7.0f, seed + 80, 3).gradient / 7.0f;
@@ -139,7 +139,7 @@ Texture steel_texture() {
   return [](const Vec3& rest_mm, const Vec3&) {
     const float streak = gradient_noise(rest_mm.cast<float>() / 2.5f, 7).value;
     Texel texel;
-    texel.albedo = Colour(0.40f, 0.405f, 0.41f) * (1 + 0.06f * streak);
+    texel.albedo = Colour(0.150f, 0.155f, 0.160f) * (1 + 0.06f * streak);
     return texel;
   };
 }

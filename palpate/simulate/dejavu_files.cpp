@@ -1,0 +1,60 @@
+#include "palpate/simulate/dejavu_files.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <opencv2/videoio.hpp>
+
+#include "palpate/core/errors.h"
+
+namespace palpate {
+
+void write_truth(const std::filesystem::path& file, const std::vector<TruthRow>& rows) {
+  std::ofstream out(file);
+  out << "frame,time_s,in_contact,fx_N,fy_N,fz_N,force_N,tip_x_mm,tip_y_mm,tip_z_mm,visible\n";
+  for (const TruthRow& row : rows)
+    out << fmt::format("{},{:.4f},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{}\n", row.frame, row.time_s,
+                       row.in_contact ? 1 : 0, row.force_N.x(), row.force_N.y(), row.force_N.z(), row.force_N.norm(),
+                       row.tip_mm.x(), row.tip_mm.y(), row.tip_mm.z(), row.visible ? 1 : 0);
+  out.close();
+  if (!out) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
+}
+
+void write_calibration(const std::filesystem::path& file, const SimulatedCamera& camera) {
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << camera.focal_px, 0, 0.5 * (camera.width - 1), 0, camera.focal_px,
+                     0.5 * (camera.height - 1), 0, 0, 1);
+  const cv::Mat none = cv::Mat::zeros(1, 5, CV_64F);
+  cv::FileStorage storage(file.string(), cv::FileStorage::WRITE);
+  if (!storage.isOpened()) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
+  storage.writeComment("px and mm; x_right = R x_left + T; pixel centres at integer coordinates");
+  storage << "image_width" << camera.width << "image_height" << camera.height << "fps" << camera.fps;
+  storage << "K1" << K << "D1" << none << "K2" << K << "D2" << none;
+  storage << "R" << cv::Mat::eye(3, 3, CV_64F) << "T" << (cv::Mat_<double>(3, 1) << -camera.baseline_mm, 0, 0);
+}
+
+struct StereoVideoWriter::Files {
+  cv::VideoWriter left, right;
+};
+
+StereoVideoWriter::StereoVideoWriter(const std::filesystem::path& folder, const SimulatedCamera& camera)
+    : files_(std::make_unique<Files>()) {
+  const cv::Size size(camera.width, camera.height);
+  const auto open = [&](cv::VideoWriter& writer, const char* name) {
+    // MPEG-4 part 2 at the bit rate that OpenCV asks for keeps the grain of the texture; its H.264 preset blurs it.
+    const auto file = folder / name;
+    if (!writer.open(file.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), camera.fps, size))
+      throw Unfinished(fmt::format("{}: the video cannot be written", file.string()));
+  };
+  open(files_->left, "left.mp4");
+  open(files_->right, "right.mp4");
+}
+
+StereoVideoWriter::~StereoVideoWriter() = default;
+StereoVideoWriter::StereoVideoWriter(StereoVideoWriter&&) noexcept = default;
+
+void StereoVideoWriter::write(const StereoFrame& frame) {
+  files_->left.write(frame.left);
+  files_->right.write(frame.right);
+}
+
+}  // namespace palpate

@@ -1,0 +1,114 @@
+#include "palpate/simulate/truth_body.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "palpate/core/errors.h"
+
+namespace palpate {
+namespace {
+
+const double kEdgesPerRadius = 4;  // of the mesh inside the patch
+const double kFocusRadii = 2.5;    // the mesh is finer within so many radii of the patch
+const double kFocusEdgeRatio = 0.45;
+
+const Vec3& at(const std::vector<Vec3>& values, int i) {
+  return values[static_cast<size_t>(i)];
+}
+
+// Surface nodes within the radius of the contact along its tangent plane, on its side of the body.
+std::vector<int> patch_nodes(const TruthBody& body, const Vec3& center, const Vec3& normal, double radius_mm) {
+  const std::vector<Vec3> normals = vertex_normals(body.mesh.nodes_mm, body.boundary);
+  std::vector<int> nodes;
+  for (int i = 0; i < static_cast<int>(normals.size()); ++i) {
+    if (at(normals, i).dot(normal) < 0.3) continue;
+    const Vec3 offset = at(body.mesh.nodes_mm, i) - center;
+    const double height = offset.dot(normal);
+    if (std::abs(height) < radius_mm && (offset - height * normal).norm() <= radius_mm) nodes.push_back(i);
+  }
+  return nodes;
+}
+
+// Integral over the surface of how much each point moves with the tied nodes.
+double area_moved_mm2(const TruthBody& body, const std::set<int>& tied) {
+  double area = 0;
+  for (const auto& [a, b, c] : body.boundary) {
+    const Vec3& pa = at(body.mesh.nodes_mm, a);
+    const double whole = 0.5 * (at(body.mesh.nodes_mm, b) - pa).cross(at(body.mesh.nodes_mm, c) - pa).norm();
+    for (int node : {a, b, c})
+      if (tied.contains(node)) area += whole / 3;
+  }
+  return area;
+}
+
+}  // namespace
+
+TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
+                          const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
+                          const Vec3& contact_normal, double radius_mm) {
+  TruthBody body;
+  const MeshFocus focus{contact_mm, kFocusRadii * radius_mm, kFocusEdgeRatio};
+  body.mesh =
+      refine_near(tetrahedralize(organ, elements, focus), contact_mm, 1.2 * radius_mm, radius_mm / kEdgesPerRadius);
+  body.boundary = boundary_triangles(body.mesh);
+  body.fixed_nodes = select_attachments(body.mesh, attachments, project_px);
+
+  const std::vector<int> tied = patch_nodes(body, contact_mm, contact_normal, radius_mm);
+  for (int node : tied)
+    if (std::binary_search(body.fixed_nodes.begin(), body.fixed_nodes.end(), node))
+      throw BadInput("simulate.gesture: the instrument touches attached tissue; at_px has to lie outside attachments");
+  if (tied.empty())
+    throw BadInput(fmt::format("simulate.gesture: footprint_radius_mm {} holds no node of the true body", radius_mm));
+  for (int node : tied) body.footprint.samples.push_back({{node, node, node}, Vec3::UnitX()});
+  body.footprint.center_mm = contact_mm;
+  body.footprint.normal = contact_normal;
+  body.patch_radius_mm = std::sqrt(area_moved_mm2(body, {tied.begin(), tied.end()}) / std::numbers::pi);
+  return body;
+}
+
+Skin attach_skin(const std::vector<Vec3>& points_mm, const std::vector<Vec3>& nodes_mm,
+                 const std::vector<Triangle>& boundary) {
+  // A ball around each triangle rules most of them out.
+  std::vector<Vec3> center;
+  std::vector<double> reach;
+  for (const auto& [a, b, c] : boundary) {
+    const Vec3 middle = (at(nodes_mm, a) + at(nodes_mm, b) + at(nodes_mm, c)) / 3;
+    center.push_back(middle);
+    reach.push_back(std::max(
+        {(at(nodes_mm, a) - middle).norm(), (at(nodes_mm, b) - middle).norm(), (at(nodes_mm, c) - middle).norm()}));
+  }
+  Skin skin;
+  skin.nodes.resize(points_mm.size());
+  skin.barycentric.resize(points_mm.size());
+  tbb::parallel_for(size_t{0}, points_mm.size(), [&](size_t i) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (size_t t = 0; t < boundary.size(); ++t) {
+      if ((center[t] - points_mm[i]).norm() - reach[t] >= nearest) continue;
+      const auto& [a, b, c] = boundary[t];
+      const ClosestPoint found =
+          closest_point_on_triangle(points_mm[i], at(nodes_mm, a), at(nodes_mm, b), at(nodes_mm, c));
+      if (found.distance >= nearest) continue;
+      nearest = found.distance;
+      skin.nodes[i] = boundary[t];
+      skin.barycentric[i] = found.barycentric;
+    }
+  });
+  return skin;
+}
+
+std::vector<Vec3> moved_skin(const Skin& skin, const std::vector<Vec3>& points_mm, const Eigen::VectorXd& u) {
+  std::vector<Vec3> moved = points_mm;
+  for (size_t i = 0; i < moved.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      moved[i] += skin.barycentric[i][k] * u.segment<3>(3 * skin.nodes[i][static_cast<size_t>(k)]);
+  return moved;
+}
+
+}  // namespace palpate

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <functional>
+
+#include "palpate/contact/footprint.h"
+#include "palpate/volume/attachments.h"
+#include "palpate/volume/tetrahedralize.h"
+
+namespace palpate {
+
+/// The body whose forces count as true: finer than the estimator's map and cut differently.
+struct TruthBody {
+  TetMesh mesh;
+  std::vector<Triangle> boundary;
+  std::vector<int> fixed_nodes;
+  Footprint footprint;         ///< every surface node of the patch, tied to one displacement
+  double patch_radius_mm = 0;  ///< of a disc with the area that the tied nodes move along
+};
+
+/// Fills the closed organ with about `elements` tetrahedra, finer around `contact_mm`, refined there until the patch of
+/// `radius_mm` is well sampled. `project_px` as in select_attachments. Throws BadInput when the body cannot be filled,
+/// when attachments select nothing or everything, or when the patch lies on attached tissue.
+TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
+                          const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
+                          const Vec3& contact_normal, double radius_mm);
+
+/// A fine surface that rides on the boundary of a mesh: each point moves like the nearest point of the boundary.
+struct Skin {
+  std::vector<Triangle> nodes;
+  std::vector<Vec3> barycentric;
+};
+
+Skin attach_skin(const std::vector<Vec3>& points_mm, const std::vector<Vec3>& nodes_mm,
+                 const std::vector<Triangle>& boundary);
+
+/// The points of the skin after the nodes have moved by u (mm, three entries per node).
+std::vector<Vec3> moved_skin(const Skin& skin, const std::vector<Vec3>& points_mm, const Eigen::VectorXd& u);
+
+}  // namespace palpate
