@@ -25,8 +25,9 @@ struct MeshReport {
 TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::optional<MeshFocus>& focus = {},
                        MeshReport* report = nullptr);
 
-/// The mesh with every tetrahedron that comes within `radius_mm` of `center_mm` split (longest-edge bisection, conforming)
-/// until its edges there are at most `edge_mm`. Nodes of the input keep their numbers; labels are inherited.
+/// The mesh with every tetrahedron that comes within `radius_mm` of `center_mm` split (longest-edge bisection,
+/// conforming) until its edges there are at most `edge_mm`. Nodes of the input keep their numbers; labels are
+/// inherited.
 TetMesh refine_near(const TetMesh& mesh, const Vec3& center_mm, double radius_mm, double edge_mm);
 
 /// Dihedral angles of every element, the smallest one, degrees.

@@ -1,0 +1,173 @@
+#include "palpate/volume/tetrahedralize.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Labeled_mesh_domain_3.h>
+#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
+#include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/exude_mesh_3.h>
+#include <CGAL/perturb_mesh_3.h>
+#include <CGAL/refine_mesh_3.h>
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "palpate/core/errors.h"
+#include "palpate/volume/inside.h"
+#include "palpate/volume/mesh_quality.h"
+
+namespace palpate {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
+using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
+
+constexpr double kWorstDihedral_deg = 10;
+constexpr double kAimedDihedral_deg = 14;  // perturbation and exudation stop here
+constexpr double kCountTolerance = 0.1;
+constexpr int kMostMeshings = 8;
+
+/// Cell size, as CGAL asks for it: 1 away from the focus, `edge_ratio` inside, growing by a third of the distance.
+struct SizeField {
+  using FT = Kernel::FT;
+  using Point_3 = Triangulation::Bare_point;
+  using Index = Domain::Index;
+  double size_mm = 1;
+  std::optional<MeshFocus> focus;
+
+  FT operator()(const Point_3& p, int, const Index&) const {
+    if (!focus) return size_mm;
+    const double beyond = (Vec3(p.x(), p.y(), p.z()) - focus->center_mm).norm() - focus->radius_mm;
+    return std::min(size_mm, focus->edge_ratio * size_mm + std::max(0.0, beyond) / 3);
+  }
+};
+
+struct Box {
+  Vec3 least, most;
+};
+
+Box bounds(const Surface& surface) {
+  Box box{Vec3::Constant(1e300), Vec3::Constant(-1e300)};
+  for (const Vec3& v : surface.vertices_mm) {
+    box.least = box.least.cwiseMin(v);
+    box.most = box.most.cwiseMax(v);
+  }
+  return box;
+}
+
+/// Points of the surface at least `apart_mm` from each other, to start the refinement from; taken from middles of
+/// triangles and only where the surface does bound the body.
+std::vector<Vec3> starting_points(const Surface& closed, const InsideTest& inside, double apart_mm) {
+  std::vector<Vec3> result;
+  for (const Triangle& t : closed.triangles) {
+    const Vec3 &a = closed.vertices_mm[static_cast<size_t>(t[0])], &b = closed.vertices_mm[static_cast<size_t>(t[1])],
+               &c = closed.vertices_mm[static_cast<size_t>(t[2])];
+    const Vec3 middle = (a + b + c) / 3, outwards = (b - a).cross(c - a);
+    if (std::any_of(result.begin(), result.end(),
+                    [&](const Vec3& taken) { return (taken - middle).squaredNorm() < apart_mm * apart_mm; }))
+      continue;
+    const Vec3 step = 1e-3 * outwards.normalized();
+    if (!step.allFinite() || !inside(middle - step) || inside(middle + step)) continue;
+    result.push_back(middle);
+  }
+  return result;
+}
+
+TetMesh mesh_of(const Complex& complex) {
+  TetMesh mesh;
+  std::unordered_map<const void*, int> number;
+  for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end(); ++cell) {
+    Tetrahedron t{};
+    for (int k = 0; k < 4; ++k) {
+      const auto vertex = cell->vertex(k);
+      const auto [place, is_new] = number.try_emplace(&*vertex, static_cast<int>(mesh.nodes_mm.size()));
+      if (is_new) {
+        const auto& p = vertex->point().point();
+        mesh.nodes_mm.emplace_back(p.x(), p.y(), p.z());
+      }
+      t[static_cast<size_t>(k)] = place->second;
+    }
+    mesh.tetrahedra.push_back(t);
+  }
+  mesh.label.assign(mesh.tetrahedra.size(), 0);
+  return mesh;
+}
+
+/// One Delaunay refinement with cells of `size_mm`, slivers perturbed and exuded. No clock decides anything here, and
+/// the random numbers start anew, so that the same input gives the same mesh.
+TetMesh mesh_once(const Domain& domain, const std::vector<Vec3>& start, double size_mm,
+                  const std::optional<MeshFocus>& focus) {
+  namespace P = CGAL::parameters;
+  CGAL::get_default_random() = CGAL::Random(0);
+  const SizeField cell_size{size_mm, focus}, facet_size{0.9 * size_mm, focus}, distance{0.12 * size_mm, focus};
+  const Criteria criteria(P::facet_angle = 25, P::facet_size = facet_size, P::facet_distance = distance,
+                          P::cell_radius_edge_ratio = 2, P::cell_size = cell_size);
+  Complex complex;
+  for (const Vec3& p : start) {
+    const auto vertex =
+        complex.triangulation().insert(Triangulation::Weighted_point(Kernel::Point_3(p.x(), p.y(), p.z())));
+    complex.set_dimension(vertex, 2);
+    complex.set_index(vertex, domain.index_from_surface_patch_index({0, 1}));
+  }
+  CGAL::refine_mesh_3(complex, domain, criteria, P::no_perturb(), P::no_exude(), P::manifold());
+  CGAL::perturb_mesh_3(complex, domain, P::sliver_bound = kAimedDihedral_deg);
+  CGAL::exude_mesh_3(complex, P::sliver_bound = kAimedDihedral_deg);
+  return largest_piece(mesh_of(complex));
+}
+
+}  // namespace
+
+TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::optional<MeshFocus>& focus,
+                       MeshReport* report) {
+  const double volume = enclosed_volume_mm3(closed_body);
+  if (!(volume > 0))
+    throw BadInput(fmt::format("the body encloses {:.3g} mm^3, expected a closed surface oriented outwards", volume));
+  const Box box = bounds(closed_body);
+  const double margin = 0.01 * (box.most - box.least).norm();
+  const InsideTest inside(closed_body);
+  const auto outside_value = [&inside](const Kernel::Point_3& p) { return inside({p.x(), p.y(), p.z()}) ? -1.0 : 1.0; };
+  const Domain domain = Domain::create_implicit_mesh_domain(
+      outside_value,
+      CGAL::Bbox_3(box.least.x() - margin, box.least.y() - margin, box.least.z() - margin, box.most.x() + margin,
+                   box.most.y() + margin, box.most.z() + margin),
+      CGAL::parameters::relative_error_bound = 1e-5);
+
+  // Number of elements against cell size is close to a power law of exponent -3; each meshing corrects the law.
+  const double first_guess = std::cbrt(1.6 * volume / elements);
+  const std::vector<Vec3> start = starting_points(closed_body, inside, 2.5 * first_guess);
+  double size = first_guess, last_size = 0, exponent = 3;
+  int last_count = 0;
+  TetMesh best;
+  double best_cost = 1e300, best_size = 0, best_dihedral = 0;
+  for (int meshing = 0; meshing < kMostMeshings; ++meshing) {
+    TetMesh mesh = mesh_once(domain, start, size, focus);
+    const auto count = static_cast<int>(mesh.tetrahedra.size());
+    const double error = std::abs(count - elements) / static_cast<double>(elements);
+    const double dihedral = count > 0 ? smallest_dihedral_deg(mesh) : 0;
+    const double cost =
+        std::max(0.0, error - kCountTolerance) * 1e3 + std::max(0.0, kWorstDihedral_deg - dihedral) + error;
+    printf("  meshing %d size %.3f count %d dihedral %.2f\n", meshing, size, count, dihedral);
+    if (cost < best_cost) {
+      best = std::move(mesh);
+      best_cost = cost, best_size = size, best_dihedral = dihedral;
+    }
+    if (error <= kCountTolerance && dihedral >= kWorstDihedral_deg) break;
+    if (last_count > 0 && count > 0 && count != last_count)
+      exponent = std::clamp(std::log(static_cast<double>(last_count) / count) / std::log(size / last_size), 2.0, 4.5);
+    last_count = count, last_size = size;
+    size = count == 0 ? size / 2 : size * std::pow(static_cast<double>(count) / elements, 1 / exponent);
+    if (error <= kCountTolerance) size *= meshing % 2 ? 0.985 : 1.015;
+  }
+  if (best.tetrahedra.empty()) throw BadInput("the body cannot be filled with tetrahedra: it has no inside");
+  if (report) *report = {static_cast<int>(best.tetrahedra.size()), best_dihedral, best_size};
+  return best;
+}
+
+}  // namespace palpate
