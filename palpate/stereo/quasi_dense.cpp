@@ -16,8 +16,10 @@ DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr
 
 DisparityMap match_quasi_dense(const Eyes& eyes, const Seeds& seeds, double least_disparity_px,
                                double most_disparity_px) {
-  const CellGrid grid = grow(eyes, seeds, least_disparity_px, most_disparity_px);
-  DisparityMap map = refine(eyes, fill_between_cells(grid, eyes.left_mask), 7, 2);
+  CellGrid grid = grow(eyes, seeds, least_disparity_px, most_disparity_px);
+  refine_cells(eyes, grid);
+  smooth_cells(grid);
+  DisparityMap map = fill_between_cells(eyes, grid);
   map.row_offset_px = seeds.row_offset_px;
   return map;
 }

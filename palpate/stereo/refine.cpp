@@ -2,8 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -12,180 +12,291 @@ namespace palpate {
 namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-constexpr float kMostStep_px = 0.5f;  // of one iteration
-constexpr float kLeastCorrelation = 0.5f;
-constexpr float kLeastShare = 0.35f;  // of the window that must be usable
+constexpr float kMostStep_px = 1.0f;
+constexpr float kSteepest = 0.9f;
+constexpr float kLeastCorrelation = 0.6f;
 constexpr float kDeviationFloor_px = 0.02f;
-constexpr float kNoiseSpread = 2.0f;  // neighbouring residuals are alike (video compression, model error)
+// Neighbouring residuals are alike (video compression, reflections), which smoothing over cells about makes up for.
+constexpr float kNoiseSpread = 1.1f;
+constexpr float kSameSurface_px = 0.7f;
 
-// What a window needs, one sum each.
-enum Sum { w, l, r, g, ll, rr, lr, gg, gl, gr, kSums };
+using RefineWindow = Window<16>;
 
-// Cubic (Catmull-Rom) interpolation and its derivative; x at least one pixel inside.
-struct Sample {
-  float value, slope;
-};
-Sample sample(const float* row, float x) {
-  const int i = static_cast<int>(x);
-  const float t = x - static_cast<float>(i);
-  const float a = row[i - 1], b = row[i], c = row[i + 1], d = row[i + 2];
-  const float c1 = 0.5f * (c - a), c2 = a - 2.5f * b + 2 * c - 0.5f * d, c3 = 0.5f * (d - a) + 1.5f * (b - c);
-  return {b + t * (c1 + t * (c2 + t * c3)), c1 + t * (2 * c2 + 3 * t * c3)};
-}
-
-// The products of one row of pixels, zero where a pixel has no weight.
-void products_of_row(const Eyes& eyes, const cv::Mat& disparity, int y, std::array<std::vector<float>, kSums>& out) {
-  const int width = disparity.cols;
-  const float* left = eyes.left.ptr<float>(y);
-  const float* right = eyes.right.ptr<float>(y);
-  const uchar* left_mask = eyes.left_mask.ptr(y);
-  const uchar* right_mask = eyes.right_mask.ptr(y);
-  const float* d = disparity.ptr<float>(y);
-  for (auto& channel : out) std::fill(channel.begin(), channel.end(), 0.0f);
-  for (int x = 1; x + 1 < width; ++x) {
-    const float there = static_cast<float>(x) - d[x];
-    if (!(there >= 1 && there < static_cast<float>(width - 3)) || !left_mask[x]) continue;
-    if (!right_mask[static_cast<int>(there + 0.5f)]) continue;
-    const Sample s = sample(right, there);
-    const float a = left[x] - 100, b = s.value - 100;  // smaller numbers keep the sums exact
-    const float slope = 0.5f * (s.slope + 0.5f * (left[x + 1] - left[x - 1]));
-    const size_t i = static_cast<size_t>(x);
-    out[w][i] = 1;
-    out[l][i] = a;
-    out[r][i] = b;
-    out[g][i] = slope;
-    out[ll][i] = a * a;
-    out[rr][i] = b * b;
-    out[lr][i] = a * b;
-    out[gg][i] = slope * slope;
-    out[gl][i] = slope * a;
-    out[gr][i] = slope * b;
-  }
-}
-
-struct Answer {
-  float step = 0, correlation = -1, deviation = kNothing;
-  bool valid = false;
-};
-
-Answer solve(const std::array<float, kSums>& s, float full_weight) {
-  Answer answer;
-  const float n = s[w];
-  if (n < kLeastShare * full_weight) return answer;
-  const float c_ll = s[ll] - s[l] * s[l] / n, c_rr = s[rr] - s[r] * s[r] / n, c_lr = s[lr] - s[l] * s[r] / n;
-  const float c_gg = s[gg] - s[g] * s[g] / n, c_gl = s[gl] - s[g] * s[l] / n, c_gr = s[gr] - s[g] * s[r] / n;
-  if (c_ll < 1e-2f * n || c_rr < 1e-2f * n || c_gg < 1e-3f * n) return answer;
-  const float gain = std::sqrt(c_ll / c_rr);
-  answer.correlation = c_lr / std::sqrt(c_ll * c_rr);
-  const float descent = c_gl - gain * c_gr;
-  answer.step = std::clamp(-descent / c_gg, -kMostStep_px, kMostStep_px);
-  const float residual = std::max(0.0f, c_ll + gain * gain * c_rr - 2 * gain * c_lr - descent * descent / c_gg) / n;
-  answer.deviation = std::hypot(kDeviationFloor_px, kNoiseSpread * std::sqrt(residual / c_gg));
-  answer.valid = answer.correlation > kLeastCorrelation;
-  return answer;
-}
-
-// Box sums over a band of rows: columns are added and taken off as the band moves down, then summed along the row.
-void refine_rows(const Eyes& eyes, const cv::Mat& disparity, int radius, int first, int last, bool move,
-                 DisparityMap& out) {
-  const int width = disparity.cols, height = disparity.rows;
-  const int size = 2 * radius + 1;
-  std::vector<std::array<std::vector<float>, kSums>> ring(static_cast<size_t>(size));
-  for (auto& row : ring)
-    for (auto& channel : row) channel.assign(static_cast<size_t>(width), 0.0f);
-  std::array<std::vector<double>, kSums> columns;
-  for (auto& channel : columns) channel.assign(static_cast<size_t>(width), 0.0);
-
-  const auto add = [&](int y, double sign) {
-    auto& row = ring[static_cast<size_t>((y + size) % size)];
-    if (sign > 0) products_of_row(eyes, disparity, y, row);
-    for (int k = 0; k < kSums; ++k) {
-      double* column = columns[static_cast<size_t>(k)].data();
-      const float* products = row[static_cast<size_t>(k)].data();
-      for (int x = 0; x < width; ++x) column[x] += sign * products[x];
-    }
-  };
-  for (int y = std::max(0, first - radius); y < std::min(height, first + radius); ++y) add(y, 1);
-  for (int y = first; y < last; ++y) {
-    if (y + radius < height) add(y + radius, 1);
-    std::array<double, kSums> sums{};
-    for (int x = 0; x < std::min(radius, width); ++x)
-      for (int k = 0; k < kSums; ++k)
-        sums[static_cast<size_t>(k)] += columns[static_cast<size_t>(k)][static_cast<size_t>(x)];
-    const float* d = disparity.ptr<float>(y);
-    for (int x = 0; x < width; ++x) {
-      for (int k = 0; k < kSums; ++k) {
-        const auto& column = columns[static_cast<size_t>(k)];
-        if (x + radius < width) sums[static_cast<size_t>(k)] += column[static_cast<size_t>(x + radius)];
-        if (x - radius > 0) sums[static_cast<size_t>(k)] -= column[static_cast<size_t>(x - radius - 1)];
-      }
-      out.disparity_px.at<float>(y, x) = kNothing;
-      out.deviation_px.at<float>(y, x) = kNothing;
-      out.correlation.at<float>(y, x) = kNothing;
-      if (std::isnan(d[x])) continue;
-      std::array<float, kSums> single;
-      for (size_t k = 0; k < kSums; ++k) single[k] = static_cast<float>(sums[k]);
-      const Answer answer = solve(single, static_cast<float>(size * size));
-      if (!answer.valid) continue;
-      out.disparity_px.at<float>(y, x) = move ? d[x] + answer.step : d[x];
-      out.deviation_px.at<float>(y, x) = answer.deviation;
-      out.correlation.at<float>(y, x) = answer.correlation;
-    }
-    if (y - radius >= 0) add(y - radius, -1);
-  }
-}
-
-DisparityMap pass(const Eyes& eyes, const cv::Mat& disparity, int radius, bool move) {
-  DisparityMap out;
-  for (cv::Mat* map : {&out.disparity_px, &out.deviation_px, &out.correlation}) map->create(disparity.size(), CV_32F);
-  constexpr int kBand = 64;  // rows; fixed, so that sums do not depend on the thread count
-  const int bands = (disparity.rows + kBand - 1) / kBand;
-  tbb::parallel_for(0, bands, [&](int band) {
-    refine_rows(eyes, disparity, radius, band * kBand, std::min(disparity.rows, (band + 1) * kBand), move, out);
-  });
-  return out;
+float deviation_of(float information) {
+  return std::hypot(kDeviationFloor_px, kNoiseSpread / std::sqrt(information));
 }
 
 }  // namespace
 
-cv::Mat fill_between_cells(const CellGrid& grid, const cv::Mat& left_mask) {
-  constexpr int step = CellGrid::kStep_px;
-  cv::Mat disparity(left_mask.size(), CV_32F, cv::Scalar(kNothing));
-  tbb::parallel_for(0, left_mask.rows, [&](int y) {
-    float* out = disparity.ptr<float>(y);
-    const uchar* mask = left_mask.ptr(y);
-    for (int x = 0; x < left_mask.cols; ++x) {
-      if (!mask[x]) continue;
-      const int column = x / step, row = y / step;
-      float sum = 0, weights = 0, nearest = 0;
-      for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i) {
-          const int c = column + i, r = row + j;
-          if (c >= grid.columns || r >= grid.rows || !grid.at(c, r).matched) continue;
-          const DisparityPlane& plane = grid.at(c, r).plane;
-          const float u = static_cast<float>(x - c * step), v = static_cast<float>(y - r * step);
-          const float weight = (step - std::abs(u)) * (step - std::abs(v));
-          const float value = plane.d + plane.dx * u + plane.dy * v;
-          if (weights == 0) nearest = value;
-          if (std::abs(value - nearest) > 1) continue;  // across a step of depth, no mixing
-          sum += weight * value;
-          weights += weight;
-        }
-      if (weights > 0) out[x] = sum / weights;
+void refine_cells(const Eyes& eyes, CellGrid& grid) {
+  // A touch of blur takes the finest detail away, which interpolation between pixels gets wrong.
+  cv::Mat left_grey, right_grey;
+  cv::GaussianBlur(eyes.left, left_grey, {3, 3}, 0.6);
+  cv::GaussianBlur(eyes.right, right_grey, {3, 3}, 0.6);
+  const Level left = make_level(left_grey, eyes.left_mask);
+  const Level right = make_level(right_grey, eyes.right_mask);
+  tbb::parallel_for(0, grid.rows, [&](int row) {
+    RefineWindow window;
+    for (int column = 0; column < grid.columns; ++column) {
+      Cell& cell = grid.at(column, row);
+      if (!cell.matched) continue;
+      WindowFit found;
+      cell.matched = window.cut(left, {column * CellGrid::kStep_px, row * CellGrid::kStep_px}) &&
+                     window.fit(right, cell.plane, kMostStep_px, kSteepest, 2, found) &&
+                     found.correlation > kLeastCorrelation;
+      if (cell.matched) cell = {found.plane, found.correlation, found.information, true};
     }
   });
-  return disparity;
 }
 
-DisparityMap refine(const Eyes& eyes, const cv::Mat& start_px, int radius_px, int iterations) {
+namespace {
+
+constexpr int kSmoothRadius = 5;  // cells
+using Vector6 = Eigen::Matrix<float, 6, 1>;
+
+// One cell of the neighbourhood that a quadratic is fitted to, with its share in the normal equations; arrays of eight
+// so that sums over them are vector instructions.
+struct Neighbour {
+  int column, row;
+  float u, v;  // px
+  float falloff;
+  float basis[8];      // 1, u, v, u^2 / 2, u v, v^2 / 2
+  float products[24];  // lower triangle of basis basis^T
+};
+
+std::vector<Neighbour> neighbourhood() {
+  std::vector<Neighbour> all;
+  for (int j = -kSmoothRadius; j <= kSmoothRadius; ++j)
+    for (int i = -kSmoothRadius; i <= kSmoothRadius; ++i) {
+      const float distance =
+          static_cast<float>(i * i + j * j) / static_cast<float>((kSmoothRadius + 1) * (kSmoothRadius + 1));
+      if (distance >= 1) continue;
+      const float u = static_cast<float>(i * CellGrid::kStep_px), v = static_cast<float>(j * CellGrid::kStep_px);
+      Neighbour n{i, j, u, v, (1 - distance) * (1 - distance), {1, u, v, 0.5f * u * u, u * v, 0.5f * v * v}, {}};
+      for (int k = 0, at = 0; k < 6; ++k)
+        for (int m = 0; m <= k; ++m) n.products[at++] = n.basis[k] * n.basis[m];
+      all.push_back(n);
+    }
+  return all;
+}
+
+// Quadratic through the neighbours on the same surface, as a change of the cell's own plane.
+Vector6 fit_quadratic(const CellGrid& grid, const std::vector<Cell>& cells, const std::vector<Neighbour>& around,
+                      int column, int row) {
+  const DisparityPlane plane = cells[static_cast<size_t>(row * grid.columns + column)].plane;
+  float products[24] = {}, sums[8] = {};
+  for (const Neighbour& n : around) {
+    if (!grid.holds(column + n.column, row + n.row)) continue;
+    const Cell& other = cells[static_cast<size_t>((row + n.row) * grid.columns + column + n.column)];
+    const float off = other.plane.d - plane.at(n.u, n.v);
+    if (!other.matched || std::abs(off) > kSameSurface_px) continue;
+    const float weight = other.information * n.falloff, weighted_off = weight * off;
+    for (int k = 0; k < 24; ++k) products[k] += weight * n.products[k];
+    for (int k = 0; k < 8; ++k) sums[k] += weighted_off * n.basis[k];
+  }
+  Eigen::Matrix<float, 6, 6> A = Eigen::Matrix<float, 6, 6>::Zero();
+  for (int k = 0, at = 0; k < 6; ++k)
+    for (int m = 0; m <= k; ++m) A(k, m) = products[at++];
+  // A weak belief in what the cell itself says where its neighbours are few: slopes to 0.1, curvatures to 0.005 / px.
+  A.diagonal() += (Vector6() << 0, 100, 100, 40000, 40000, 40000).finished();
+  return A.selfadjointView<Eigen::Lower>().llt().solve(Eigen::Map<const Vector6>(sums));
+}
+
+}  // namespace
+
+void smooth_cells(CellGrid& grid) {
+  // A window reports the disparity of a curved surface wrong by half its second moment times the curvature.
+  constexpr float moment = (RefineWindow::kRadius + 1) * (RefineWindow::kRadius + 1) / 5.0f;
+  const std::vector<Cell> before = grid.cells;
+  const std::vector<Neighbour> around = neighbourhood();
+  tbb::parallel_for(0, grid.rows, [&](int row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      Cell& cell = grid.at(column, row);
+      if (!cell.matched) continue;
+      const Vector6 change = fit_quadratic(grid, before, around, column, row);
+      cell.plane.d += change[0] - 0.5f * moment * (change[3] + change[5]);
+      cell.plane.dx += change[1];
+      cell.plane.dy += change[2];
+    }
+  });
+}
+
+namespace {
+
+// Difference of two small windows without their means, grey levels; large where the right one leaves the image.
+float window_difference(const Eyes& eyes, cv::Point at, float disparity) {
+  constexpr int r = 2;
+  const float x = static_cast<float>(at.x) - disparity;
+  const int whole = cvFloor(x);
+  if (whole < r || whole + r + 1 >= eyes.right.cols || at.x < r || at.x + r >= eyes.left.cols || at.y < r ||
+      at.y + r >= eyes.left.rows)
+    return std::numeric_limits<float>::max();
+  const float t = x - static_cast<float>(whole);
+  float sum = 0, squares = 0;
+  for (int v = -r; v <= r; ++v) {
+    const float* a = eyes.left.ptr<float>(at.y + v) + at.x;
+    const float* b = eyes.right.ptr<float>(at.y + v) + whole;
+    for (int u = -r; u <= r; ++u) {
+      const float difference = a[u] - b[u] - t * (b[u + 1] - b[u]);
+      sum += difference;
+      squares += difference * difference;
+    }
+  }
+  constexpr float n = (2 * r + 1) * (2 * r + 1);
+  return squares - 0.5f * sum * sum / n;
+}
+
+// What the cells around one pixel say about it.
+struct PixelGuess {
+  float disparity = kNothing;
+  float information = 0;
+  float correlation = 0;
+};
+
+// Bilinear mean of the four cells around, as far as they stand on the same surface as the first of them.
+PixelGuess blend(const CellGrid& grid, cv::Point at) {
+  constexpr int step = CellGrid::kStep_px;
+  const int column = at.x / step, row = at.y / step;
+  float weights = 0, first = 0;
+  PixelGuess sum{0, 0, 0};
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 2; ++i) {
+      if (!grid.holds(column + i, row + j) || !grid.at(column + i, row + j).matched) continue;
+      const Cell& cell = grid.at(column + i, row + j);
+      const float u = static_cast<float>(at.x - (column + i) * step), v = static_cast<float>(at.y - (row + j) * step);
+      const float weight = (step - std::abs(u)) * (step - std::abs(v));
+      const float value = cell.plane.at(u, v);
+      if (weights == 0) first = value;
+      if (std::abs(value - first) > 1) continue;
+      sum.disparity += weight * value;
+      sum.information += weight * cell.information;
+      sum.correlation += weight * cell.correlation;
+      weights += weight;
+    }
+  if (weights == 0) return {};
+  return {sum.disparity / weights, sum.information / weights, sum.correlation / weights};
+}
+
+// Large windows carry the disparity of one surface a few pixels over the edge of the next. Near a step of depth, the
+// surfaces around compete for the pixel in a small window.
+PixelGuess compete(const Eyes& eyes, const CellGrid& grid, cv::Point at, const PixelGuess& before) {
+  constexpr int step = CellGrid::kStep_px;
+  constexpr float kClearlyBetter = 0.7f;
+  PixelGuess best = before;
+  float least = -1;
+  for (int row = at.y / step - 1; row <= at.y / step + 2; ++row)
+    for (int column = at.x / step - 1; column <= at.x / step + 2; ++column) {
+      if (!grid.holds(column, row) || !grid.at(column, row).matched) continue;
+      const Cell& cell = grid.at(column, row);
+      const float value =
+          cell.plane.at(static_cast<float>(at.x - column * step), static_cast<float>(at.y - row * step));
+      if (std::abs(value - best.disparity) < 1) continue;
+      if (least < 0) least = kClearlyBetter * window_difference(eyes, at, before.disparity);
+      const float difference = window_difference(eyes, at, value);
+      if (difference >= least) continue;
+      least = difference;
+      best = {value, cell.information, cell.correlation};
+    }
+  return best;
+}
+
+// Whether cells around the square between four cells disagree about it.
+bool contested(const CellGrid& grid, int column, int row) {
+  float least = std::numeric_limits<float>::max(), most = -least;
+  for (int j = -1; j <= 2; ++j)
+    for (int i = -1; i <= 2; ++i) {
+      if (!grid.holds(column + i, row + j) || !grid.at(column + i, row + j).matched) continue;
+      const float value = grid.at(column + i, row + j)
+                              .plane.at(CellGrid::kStep_px * (0.5f - static_cast<float>(i)),
+                                        CellGrid::kStep_px * (0.5f - static_cast<float>(j)));
+      least = std::min(least, value);
+      most = std::max(most, value);
+    }
+  return most - least > 1;
+}
+
+}  // namespace
+
+DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
+  const cv::Size size = eyes.left.size();
+  constexpr int step = CellGrid::kStep_px;
   DisparityMap map;
-  map.disparity_px = start_px;
-  for (int i = 0; i < iterations; ++i) map = pass(eyes, map.disparity_px, radius_px, true);
+  for (cv::Mat* m : {&map.disparity_px, &map.deviation_px, &map.correlation})
+    *m = cv::Mat(size, CV_32F, cv::Scalar(kNothing));
+  tbb::parallel_for(0, grid.rows, [&](int row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const bool competition = contested(grid, column, row);
+      for (int y = row * step; y < std::min(size.height, (row + 1) * step); ++y)
+        for (int x = column * step; x < std::min(size.width, (column + 1) * step); ++x) {
+          if (!eyes.left_mask.at<uchar>(y, x)) continue;
+          PixelGuess guess = blend(grid, {x, y});
+          if (std::isnan(guess.disparity)) continue;
+          if (competition) guess = compete(eyes, grid, {x, y}, guess);
+          map.disparity_px.at<float>(y, x) = guess.disparity;
+          map.deviation_px.at<float>(y, x) = deviation_of(guess.information);
+          map.correlation.at<float>(y, x) = guess.correlation;
+        }
+    }
+  });
   return map;
 }
 
+namespace {
+
+constexpr int kMeasureRadius = 5;
+
+cv::Mat warped_right(const Eyes& eyes, const cv::Mat& disparity, cv::Mat& weight) {
+  cv::Mat map_x(disparity.size(), CV_32F), map_y(disparity.size(), CV_32F), right;
+  for (int y = 0; y < disparity.rows; ++y)
+    for (int x = 0; x < disparity.cols; ++x) {
+      map_x.at<float>(y, x) = static_cast<float>(x) - disparity.at<float>(y, x);
+      map_y.at<float>(y, x) = static_cast<float>(y);
+    }
+  cv::patchNaNs(map_x, -10);
+  cv::remap(eyes.right, right, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(eyes.right_mask, weight, map_x, map_y, cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+  weight &= eyes.left_mask;
+  weight &= disparity == disparity;
+  return right;
+}
+
+cv::Mat mean(const cv::Mat& values, const cv::Mat& weight_mean) {
+  cv::Mat sum;
+  const int size = 2 * kMeasureRadius + 1;
+  cv::boxFilter(values, sum, CV_32F, {size, size});
+  cv::divide(sum, weight_mean, sum);
+  return sum;
+}
+
+}  // namespace
+
 DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px) {
-  return pass(eyes, disparity_px, 5, false);
+  DisparityMap map;
+  cv::Mat usable;
+  const cv::Mat right = warped_right(eyes, disparity_px, usable);
+  cv::Mat w, w_mean, slope;
+  usable.convertTo(w, CV_32F, 1.0 / 255);
+  cv::boxFilter(w, w_mean, CV_32F, {2 * kMeasureRadius + 1, 2 * kMeasureRadius + 1});
+  w_mean += 1e-6f;
+  cv::Sobel(eyes.left, slope, CV_32F, 1, 0, cv::FILTER_SCHARR, 1.0 / 32);
+  const cv::Mat l = eyes.left.mul(w), r = right.mul(w), g = slope.mul(w);
+  const cv::Mat ml = mean(l, w_mean), mr = mean(r, w_mean), mg = mean(g, w_mean);
+  const cv::Mat ll = mean(l.mul(l), w_mean) - ml.mul(ml), rr = mean(r.mul(r), w_mean) - mr.mul(mr);
+  const cv::Mat lr = mean(l.mul(r), w_mean) - ml.mul(mr), gg = mean(g.mul(g), w_mean) - mg.mul(mg);
+  for (cv::Mat* m : {&map.disparity_px, &map.deviation_px, &map.correlation})
+    *m = cv::Mat(disparity_px.size(), CV_32F, cv::Scalar(kNothing));
+  const float pixels = (2 * kMeasureRadius + 1) * (2 * kMeasureRadius + 1);
+  for (int y = 0; y < w.rows; ++y)
+    for (int x = 0; x < w.cols; ++x) {
+      const float a = ll.at<float>(y, x), b = rr.at<float>(y, x), c = gg.at<float>(y, x);
+      if (!usable.at<uchar>(y, x) || a < 1e-2f || b < 1e-2f || c < 1e-3f) continue;
+      const float correlation = lr.at<float>(y, x) / std::sqrt(a * b);
+      const float residual = std::max(1e-3f, 2 * a * (1 - correlation));
+      map.disparity_px.at<float>(y, x) = disparity_px.at<float>(y, x);
+      map.correlation.at<float>(y, x) = correlation;
+      map.deviation_px.at<float>(y, x) = deviation_of(c * pixels * w_mean.at<float>(y, x) / residual);
+    }
+  return map;
 }
 
 }  // namespace palpate

@@ -5,14 +5,16 @@
 
 namespace palpate {
 
-/// Disparity of every pixel between matched cells, from their planes; NaN elsewhere and outside the left mask.
-cv::Mat fill_between_cells(const CellGrid& grid, const cv::Mat& left_mask);
+/// Fits every matched cell again at full size with larger windows (sub-pixel refinement).
+void refine_cells(const Eyes& eyes, CellGrid& grid);
 
-/// Lucas-Kanade along the row for every pixel at once, starting from a dense disparity: each pixel's window is warped
-/// by the disparities of all its pixels (so that slant and curvature do no harm), gain and offset are free, masked
-/// pixels of either eye have no weight. Leaves disparity, correlation and the deviation that residual and gradient
-/// energy imply.
-DisparityMap refine(const Eyes& eyes, const cv::Mat& start_px, int radius_px, int iterations);
+/// Moving least squares: the plane of every matched cell from its neighbours on the same surface, weighted by their
+/// information.
+void smooth_cells(CellGrid& grid);
+
+/// Disparity, deviation and correlation of every pixel of the left mask from the planes of the cells around it; at a
+/// step of depth the surface whose small window fits better takes the pixel.
+DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid);
 
 /// Correlation and deviation of a disparity found by other means.
 DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px);
