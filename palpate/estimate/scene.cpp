@@ -1,7 +1,5 @@
 #include "palpate/estimate/scene.h"
 
-#include "palpate/core/errors.h"
-
 namespace palpate {
 
 void describe(Settings& settings, MapOptions& options) {
@@ -19,12 +17,7 @@ void describe(Settings& settings, MapOptions& options) {
   describe(settings, options.surface);
 }
 
-void describe(Settings& settings, Scene& scene, bool with_recording) {
-  if (with_recording) {
-    settings.group("recording", "the two videos and their calibration",
-                   [&scene](Settings& group) { describe(group, scene.recording); });
-    settings.require("recording");
-  }
+void describe(Settings& settings, Scene& scene) {
   settings.group("map", "the build stage", [&scene](Settings& group) { describe(group, scene.map); });
   settings.group("tissue", "gamma of Eq. 1: law and constants",
                  [&scene](Settings& group) { describe(group, scene.tissue); });

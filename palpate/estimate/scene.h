@@ -20,7 +20,7 @@ struct Scene {
   ContactOptions contact;
 };
 
-/// Binds every part of the scene file. `with_recording` is false for scenes that are to be simulated.
-void describe(Settings& settings, Scene& scene, bool with_recording = true);
+/// Binds every part but `recording`, which a scene that is to be simulated does not have.
+void describe(Settings& settings, Scene& scene);
 
 }  // namespace palpate

@@ -1,0 +1,58 @@
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "app/runtime.h"
+#include "app/scene_file.h"
+#include "app/verbs.h"
+#include "palpate/core/errors.h"
+
+int main(int argc, char** argv) {
+  using namespace palpate;
+  app::choose_blas_core(argv);
+  app::watch_for_interrupt();
+
+  CLI::App program(
+      "Palpate: feel what the endoscope sees. Force between instrument and tissue from stereo video.\n"
+      "Research software, not a medical device.",
+      "palpate");
+  program.set_version_flag("--version", PALPATE_VERSION);
+  program.set_help_all_flag("--help-all", "every verb in full");
+  program.require_subcommand(0, 1);
+  program.footer(
+      "Exit codes: 0 done, 2 wrong use, 3 bad input, 4 could not finish (what was done is kept), 1 our bug.\n"
+      "Example: palpate demo -o demo");
+  bool document_scene = false;
+  program.add_flag("--document-scene", document_scene, "print every key of scene.yaml as a Markdown table");
+  app::add_demo(program);
+  app::add_simulate(program);
+  app::add_map(program);
+  app::add_estimate(program);
+  app::add_compare(program);
+  app::add_check(program);
+  app::add_later_verbs(program);
+
+  try {
+    program.parse(argc, argv);
+    if (document_scene) {
+      fmt::print("{}", app::document_scene_file());
+    } else if (program.get_subcommands().empty()) {
+      fmt::print(stderr, "{}", program.help());
+      return app::kWrongUse;
+    }
+    return app::kDone;
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    return program.exit(error) == 0 ? app::kDone : app::kWrongUse;
+  } catch (const BadInput& error) {
+    fmt::print(stderr, "palpate: {}\n", error.what());
+    return app::kBadInput;
+  } catch (const Unfinished& error) {
+    fmt::print(stderr, "palpate: {}\n", error.what());
+    return app::kNotFinished;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "palpate: internal error, please report it: {}\n", error.what());
+    return app::kOurBug;
+  }
+}

@@ -1,0 +1,258 @@
+#include "app/run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/progress.h"
+#include "app/runtime.h"
+#include "palpate/core/errors.h"
+#include "palpate/core/mesh_files.h"
+#include "palpate/core/stopwatch.h"
+#include "palpate/estimate/force_estimator.h"
+#include "palpate/feedback/map_json.h"
+#include "palpate/feedback/map_preview.h"
+#include "palpate/feedback/overlay.h"
+#include "palpate/feedback/report.h"
+#include "palpate/feedback/video_writer.h"
+
+namespace palpate::app {
+
+namespace {
+
+constexpr int kReportPictures = 6;
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream stream(file);
+  stream << text;
+  if (!stream.flush()) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<size_t>(std::round(share * static_cast<double>(values.size() - 1)))];
+}
+
+std::string run_yaml(const SceneFile& scene_file, const Rectification& rectification) {
+  const Mat3& R = rectification.rectified_from_left;
+  std::string text =
+      fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
+  text += "# axes of the rectified pair in the left camera frame, row by row\n";
+  text += fmt::format("# rectified_from_left: [[{}, {}, {}], [{}, {}, {}], [{}, {}, {}]]\n", R(0, 0), R(0, 1), R(0, 2),
+                      R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
+  return text;
+}
+
+/// The frames worth a picture in the report: spread over the contact, or over the run where there is none.
+class PictureChoice {
+ public:
+  PictureChoice(int frames) : every_(std::max(1, frames / (2 * kReportPictures))) {}
+
+  void offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
+    if (estimate.frame % every_ != 0) return;
+    pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate)}});
+  }
+
+  std::vector<ReportPicture> chosen() const {
+    std::vector<size_t> order(pictures_.size());
+    for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(),
+                     [this](size_t a, size_t b) { return pictures_[a].force_N > pictures_[b].force_N; });
+    order.resize(std::min<size_t>(order.size(), kReportPictures));
+    std::sort(order.begin(), order.end());
+    std::vector<ReportPicture> result;
+    for (size_t i : order) result.push_back(pictures_[i].picture);
+    return result;
+  }
+
+ private:
+  static std::string caption(const ForceEstimate& estimate) {
+    return fmt::format("frame {}, {:.2f} s, {}, {:.2f} N", estimate.frame, estimate.time_s,
+                       status_name(estimate.status), estimate.force_N.norm());
+  }
+
+  struct Offered {
+    double force_N;
+    ReportPicture picture;
+  };
+  int every_;
+  std::vector<Offered> pictures_;
+};
+
+/// Everything that grows frame by frame, and the page that is made of it at the end, whatever the end is.
+struct RunFiles {
+  const SceneFile& scene_file;
+  const RunOptions& options;
+  const BuiltMap& built;
+  ForcesWriter forces;
+  VideoWriter overlay;
+  OverlayPainter painter;
+  PictureChoice pictures;
+  std::vector<ForceRow> rows;
+  std::vector<FrameTimes> times;
+
+  RunFiles(const SceneFile& s, const RunOptions& o, const BuiltMap& b, const Recording& recording)
+      : scene_file(s),
+        options(o),
+        built(b),
+        forces(o.folder / "forces.csv"),
+        overlay(o.folder / "overlay.mp4", recording.fps(), recording.size()),
+        painter(b.rectification, s.scene.tissue, s.overlay),
+        pictures(recording.frame_count()) {}
+
+  void add(const StereoFrame& frame, ForceEstimate estimate) {
+    Stopwatch watch;
+    const cv::Mat picture = painter.paint(frame.left, estimate);
+    estimate.times.draw_ms = watch.lap_ms();
+    forces.write(estimate);
+    overlay.write(picture);
+    pictures.offer(picture, estimate);
+    rows.push_back(to_row(estimate));
+    times.push_back(estimate.times);
+  }
+
+  void close() {
+    overlay.finish();
+    Report report;
+    report.title = scene_file.file.stem().string();
+    report.rows = rows;
+    if (!options.truth.empty()) report.truth = read_forces(options.truth);
+    report.times = times;
+    report.tissue = scene_file.scene.tissue;
+    report.settings = run_yaml(scene_file, built.rectification);
+    report.pictures = pictures.chosen();
+    write_report(options.folder / "report.html", report);
+  }
+};
+
+RunSummary summary_of(const RunFiles& files, double map_s) {
+  RunSummary summary;
+  summary.frames = static_cast<int>(files.rows.size());
+  summary.elements = static_cast<int>(files.built.map.mesh.tetrahedra.size());
+  summary.map_s = map_s;
+  std::vector<double> frame_ms;
+  for (const FrameTimes& times : files.times) frame_ms.push_back(times.total_ms());
+  summary.median_frame_ms = percentile(frame_ms, 0.5);
+  summary.p99_frame_ms = percentile(frame_ms, 0.99);
+  for (const ForceRow& row : files.rows) {
+    summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);
+    ++summary.frames_by_status[row.status];
+  }
+  if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_forces(files.options.truth));
+  return summary;
+}
+
+}  // namespace
+
+BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
+  const Scene& scene = scene_file.scene;
+  Recording recording(scene.recording);
+  const StereoRig rig = read_rig(scene.recording.calibration, scene.recording.translation_unit);
+  check_rig_fits(rig, recording.size());
+  if (!quiet) fmt::print(stderr, "calibration {}\n", describe_rig(rig, recording.size()));
+  BuiltMap built;
+  built.rectification = make_rectification(rig, recording.size());
+  while (auto frame = recording.next()) {
+    if (frame->index < scene.map.frame) continue;
+    built.frame = *frame;
+    built.map = build_tissue_map(built.frame, built.rectification, scene.map, scene.tissue, scene.attachments);
+    return built;
+  }
+  throw BadInput(fmt::format("{}: map.frame is {}, but the recording has only {} frames",
+                             scene_file.file.filename().string(), scene.map.frame, recording.frame_count()));
+}
+
+void write_map_files(const BuiltMap& built, const std::filesystem::path& folder) {
+  const TissueMap& map = built.map;
+  MeshArrays arrays;
+  arrays.node_scalars["fixed"].assign(map.mesh.nodes_mm.size(), 0.0);
+  for (int node : map.fixed_nodes) arrays.node_scalars["fixed"][static_cast<size_t>(node)] = 1;
+  arrays.element_scalars["label"].assign(map.mesh.label.begin(), map.mesh.label.end());
+  write_vtu(folder / "map.vtu", map.mesh, arrays);
+  write_ply(folder / "surface.ply", map.surface);
+  write_ply(folder / "cloud.ply", map.cloud);
+  write_text(folder / "map.json", map_json(map, built.rectification));
+  if (!cv::imwrite((folder / "preview.png").string(), draw_map_preview(built.frame.left, built.rectification, map)))
+    throw Unfinished(fmt::format("{}: cannot be written", (folder / "preview.png").string()));
+}
+
+RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) {
+  if (!options.truth.empty()) read_forces(options.truth);
+  Stopwatch watch;
+  const BuiltMap built = build_map(scene_file, options.quiet);
+  const double map_s = watch.lap_ms() / 1000;
+  if (!options.quiet)
+    fmt::print(stderr, "map         {} tetrahedra, {} attached nodes, {} points, {:.2f} s\n",
+               built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
+
+  const Scene& scene = scene_file.scene;
+  ForceEstimator estimator(built.map, built.frame, built.rectification, scene.attachments, scene.instrument,
+                           scene.contact);
+  Recording recording(scene.recording);
+  std::filesystem::create_directories(options.folder);
+  write_map_files(built, options.folder);
+  write_text(options.folder / "run.yaml", run_yaml(scene_file, built.rectification));
+  RunFiles files(scene_file, options, built, recording);
+  try {
+    Progress progress("estimate", options.quiet);
+    while (auto frame = recording.next()) {
+      const ForceEstimate estimate = estimator.update(*frame);
+      files.add(*frame, estimate);
+      progress.show(frame->index + 1, recording.frame_count(),
+                    fmt::format("{} {:.2f} N", status_name(estimate.status), estimate.force_N.norm()));
+      if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
+    }
+  } catch (const Unfinished& reason) {
+    files.close();
+    throw Unfinished(
+        fmt::format("{}; {} frames are kept in {}", reason.what(), files.rows.size(), options.folder.string()));
+  }
+  files.close();
+  return summary_of(files, map_s);
+}
+
+std::string to_text(const RunSummary& summary) {
+  std::string text;
+  const auto line = [&text](const std::string& name, const std::string& value) {
+    text += fmt::format("{:<22}{}\n", name, value);
+  };
+  std::string statuses;
+  for (const auto& [status, count] : summary.frames_by_status)
+    statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
+  line("frames", fmt::format("{} ({})", summary.frames, statuses));
+  line("map", fmt::format("{} tetrahedra in {:.2f} s", summary.elements, summary.map_s));
+  line("time per frame", fmt::format("{:.1f} ms median, {:.1f} ms p99", summary.median_frame_ms, summary.p99_frame_ms));
+  line("peak force", fmt::format("{:.2f} N", summary.peak_force_N));
+  if (!summary.comparison) return text;
+  const Comparison& c = *summary.comparison;
+  line("true peak force", fmt::format("{:.2f} N", c.true_peak_N));
+  line("force RMSE", fmt::format("{:.3f} N", c.force_rmse_N));
+  if (c.force_nrmse_pct) line("force NRMSE", fmt::format("{:.1f} % of the true peak", *c.force_nrmse_pct));
+  if (c.direction_error_deg_median)
+    line("direction error", fmt::format("{:.1f} degrees median", *c.direction_error_deg_median));
+  if (c.onset_error_frames) line("onset error", fmt::format("{:+d} frames", *c.onset_error_frames));
+  if (c.release_error_frames) line("release error", fmt::format("{:+d} frames", *c.release_error_frames));
+  line("false contact", fmt::format("{} frames", c.false_contact_frames));
+  if (c.tip_rmse_mm) line("tip RMSE", fmt::format("{:.2f} mm", *c.tip_rmse_mm));
+  return text;
+}
+
+std::string to_json(const RunSummary& summary) {
+  nlohmann::ordered_json json;
+  json["frames"] = summary.frames;
+  json["frames_by_status"] = summary.frames_by_status;
+  json["elements"] = summary.elements;
+  json["map_s"] = summary.map_s;
+  json["median_frame_ms"] = summary.median_frame_ms;
+  json["p99_frame_ms"] = summary.p99_frame_ms;
+  json["peak_force_N"] = summary.peak_force_N;
+  if (summary.comparison) json["comparison"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison));
+  return json.dump(1) + "\n";
+}
+
+}  // namespace palpate::app

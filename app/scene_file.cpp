@@ -1,0 +1,47 @@
+#include "app/scene_file.h"
+
+#include <fmt/format.h>
+
+#include "palpate/core/errors.h"
+
+namespace palpate::app {
+
+void describe(Settings& settings, SceneFile& scene_file) {
+  settings.group(
+      "recording", "the two videos and their calibration",
+      [&scene_file](Settings& group) { palpate::describe(group, scene_file.scene.recording); },
+      &scene_file.has_recording);
+  palpate::describe(settings, scene_file.scene);
+  settings.group("overlay", "how the stress is drawn",
+                 [&scene_file](Settings& group) { palpate::describe(group, scene_file.overlay); });
+  settings.group(
+      "simulate", "what DejaVu makes (palpate simulate)",
+      [&scene_file](Settings& group) { palpate::describe(group, scene_file.simulate); }, &scene_file.has_simulate);
+}
+
+SceneFile read_scene_file(const std::filesystem::path& file, bool needs_recording) {
+  SceneFile scene_file;
+  scene_file.file = file;
+  Settings settings;
+  describe(settings, scene_file);
+  read_settings_file(file, settings);
+  if (needs_recording && !scene_file.has_recording)
+    throw BadInput(
+        fmt::format("{}: recording is missing (the two videos and their calibration)", file.filename().string()));
+  return scene_file;
+}
+
+std::string write_scene_file(SceneFile scene_file) {
+  Settings settings;
+  describe(settings, scene_file);
+  return write_settings(settings);
+}
+
+std::string document_scene_file() {
+  SceneFile scene_file;
+  Settings settings;
+  describe(settings, scene_file);
+  return document_settings(settings);
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "palpate/estimate/scene.h"
+#include "palpate/feedback/overlay.h"
+#include "palpate/simulate/simulate_options.h"
+
+namespace palpate::app {
+
+/// A scene file as the program knows it: what is estimated, what is simulated, how it is shown.
+struct SceneFile {
+  std::filesystem::path file;
+  Scene scene;
+  OverlayOptions overlay;
+  SimulateOptions simulate;
+  bool has_recording = false;
+  bool has_simulate = false;
+};
+
+void describe(Settings& settings, SceneFile& scene_file);
+
+/// Throws BadInput; `needs_recording`: the file must name a recording.
+SceneFile read_scene_file(const std::filesystem::path& file, bool needs_recording);
+
+/// Every setting in effect, as YAML.
+std::string write_scene_file(SceneFile scene_file);
+
+/// docs/scene.md: every key with its default, values and meaning.
+std::string document_scene_file();
+
+}  // namespace palpate::app

@@ -1,0 +1,40 @@
+#include "app/simulation.h"
+
+#include <fstream>
+
+#include "app/progress.h"
+#include "app/runtime.h"
+#include "palpate/core/errors.h"
+
+namespace palpate::app {
+
+SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path& folder, bool quiet,
+                        DejaVuSummary& summary) {
+  {
+    Progress progress("simulate", quiet);
+    summary = simulate_dejavu(simulated.simulate, simulated.scene.tissue, simulated.scene.attachments,
+                              simulated.scene.contact, folder, [&progress](int done, int total) {
+                                progress.show(done, total);
+                                if (interrupted()) throw Unfinished("interrupted while the sequence was made");
+                              });
+  }
+  SceneFile estimated = simulated;
+  estimated.has_simulate = false;
+  estimated.has_recording = true;
+  estimated.file = folder / "scene.yaml";
+  Scene& scene = estimated.scene;
+  scene.recording.left = "left.mp4";
+  scene.recording.right = "right.mp4";
+  scene.recording.calibration = "calibration.yaml";
+  scene.map.organ_region_px = summary.organ_region_px;
+  scene.map.thickness_mm = summary.thickness_mm;
+  scene.contact.footprint_radius_mm = summary.contact_radius_mm;
+  scene.contact.grip = Grip::grasp;
+  std::ofstream stream(estimated.file);
+  stream << write_scene_file(estimated);
+  if (!stream.flush()) throw Unfinished(estimated.file.string() + ": cannot be written");
+  stream.close();
+  return read_scene_file(estimated.file, true);
+}
+
+}  // namespace palpate::app

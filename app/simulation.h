@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+
+#include "app/scene_file.h"
+#include "palpate/simulate/dejavu.h"
+
+namespace palpate::app {
+
+/// DejaVu's recording in `folder` and, beside it, the estimator's own scene.yaml; returns that scene as read back.
+SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path& folder, bool quiet,
+                        DejaVuSummary& summary);
+
+}  // namespace palpate::app

@@ -1,0 +1,57 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "app/run.h"
+#include "app/simulation.h"
+#include "app/verbs.h"
+#include "palpate/simulate/uterus_demo.h"
+
+namespace palpate::app {
+
+namespace {
+
+/// The paper's map has 550 elements.
+constexpr int kElements = 550;
+
+SceneFile demo_scene() {
+  const SimulatedCase demo = uterus_demo();
+  SceneFile scene_file;
+  scene_file.file = "demo.yaml";
+  scene_file.simulate = demo.simulate;
+  scene_file.has_simulate = true;
+  scene_file.scene.tissue = demo.tissue;
+  scene_file.scene.attachments = demo.attachments;
+  scene_file.scene.contact = demo.contact;
+  scene_file.scene.map.elements = kElements;
+  return scene_file;
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app) {
+  struct Arguments {
+    std::filesystem::path folder = "palpate_demo";
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb =
+      app.add_subcommand("demo", "The main job on a sequence that it makes itself: simulate, estimate, compare");
+  verb->add_option("-o,--output", arguments->folder, "folder for the sequence and the results")->capture_default_str();
+  verb->add_flag("--json", arguments->json, "figures as JSON on standard output, no progress");
+  verb->footer("Example: palpate demo -o demo && xdg-open demo/report.html");
+  verb->callback([arguments] {
+    const std::filesystem::path recording = arguments->folder / "recording";
+    DejaVuSummary simulated;
+    const SceneFile scene_file = simulate_into(demo_scene(), recording, arguments->json, simulated);
+    const RunSummary summary = run_estimate(scene_file, {arguments->folder, recording / "truth.csv", arguments->json});
+    if (arguments->json) {
+      fmt::print("{}", to_json(summary));
+      return;
+    }
+    fmt::print("\n{}{:<22}{}\n", to_text(summary), "look at", (arguments->folder / "report.html").string());
+  });
+}
+
+}  // namespace palpate::app

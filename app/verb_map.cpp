@@ -1,0 +1,47 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app/run.h"
+#include "app/verbs.h"
+#include "palpate/feedback/map_json.h"
+
+namespace palpate::app {
+
+void add_map(CLI::App& app) {
+  struct Arguments {
+    std::filesystem::path scene, folder = "palpate_map";
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = app.add_subcommand("map", "Build stage: map.vtu, surface.ply, cloud.ply, preview.png, map.json");
+  verb->add_option("scene", arguments->scene, "scene.yaml")->required();
+  verb->add_option("-o,--output", arguments->folder, "folder for the results")->capture_default_str();
+  verb->add_flag("--json", arguments->json, "map.json on standard output too, no progress");
+  verb->footer("Example: palpate map scene.yaml -o map");
+  verb->callback([arguments] {
+    const SceneFile scene_file = read_scene_file(arguments->scene, true);
+    const BuiltMap built = build_map(scene_file, arguments->json);
+    std::filesystem::create_directories(arguments->folder);
+    write_map_files(built, arguments->folder);
+    if (arguments->json) {
+      fmt::print("{}\n", map_json(built.map, built.rectification));
+      return;
+    }
+    const MapReport& report = built.map.report;
+    fmt::print("points       {} ({:.0f} % of the organ region), depth deviation {:.2f} mm median\n",
+               report.matched_points, 100 * report.coverage, report.median_depth_deviation_mm);
+    fmt::print("surface      {} triangles\n", built.map.surface.triangles.size());
+    fmt::print("volume       {} tetrahedra, smallest dihedral angle {:.1f} degrees, {} of {} nodes attached\n",
+               built.map.mesh.tetrahedra.size(), report.mesh.smallest_dihedral_deg, built.map.fixed_nodes.size(),
+               built.map.mesh.nodes_mm.size());
+    fmt::print(
+        "time         rectify {:.0f}, match {:.0f}, triangulate {:.0f}, clean {:.0f}, surface {:.0f}, volume "
+        "{:.0f}, attachments {:.0f} ms\n",
+        report.rectify_ms, report.match_ms, report.triangulate_ms, report.clean_ms, report.surface_ms, report.volume_ms,
+        report.attachments_ms);
+    fmt::print("written to   {}\n", arguments->folder.string());
+  });
+}
+
+}  // namespace palpate::app
