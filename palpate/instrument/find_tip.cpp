@@ -32,13 +32,14 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Pixels of the picture that have the outside for a neighbour.
-cv::Mat picture_border(const cv::Size& size, const cv::Mat& picture_area) {
-  cv::Mat inside = cv::Mat::zeros(size, CV_8U);
-  inside(cv::Rect(2, 2, size.width - 4, size.height - 4)) = 255;
+/// Pixels of the box that lie within two of the end of the picture.
+cv::Mat picture_border(const cv::Size& size, const cv::Rect& box, const cv::Mat& picture_area) {
+  cv::Mat inside = cv::Mat::zeros(box.size(), CV_8U);
+  const cv::Rect middle = (cv::Rect(2, 2, size.width - 4, size.height - 4) & box) - box.tl();
+  if (middle.area() > 0) inside(middle) = 255;
   if (!picture_area.empty()) {
-    cv::Mat eroded;
-    cv::erode(picture_area, eroded, cv::Mat::ones(5, 5, CV_8U));
+    cv::Mat eroded;  // an ROI is eroded with the pixels around it
+    cv::erode(picture_area(box), eroded, cv::Mat::ones(5, 5, CV_8U));
     inside &= eroded;
   }
   return inside == 0;
@@ -200,7 +201,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
   const cv::Rect box = cv::boundingRect(instrument_mask);
   if (box.area() < kLeastPixels) return {};
-  const cv::Mat border = picture_border(instrument_mask.size(), picture_area)(box);
+  const cv::Mat border = picture_border(instrument_mask.size(), box, picture_area);
   cv::Mat labels, stats, centres;
   const int count = cv::connectedComponentsWithStats(instrument_mask(box), labels, stats, centres, 8);
   std::vector<int> by_size;

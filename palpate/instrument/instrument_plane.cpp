@@ -22,19 +22,29 @@ struct System {
   double agreement() const { return full_information > 0 ? information / full_information : 0; }
 };
 
-CellWarp warp_cell(const cv::Point2d& center, const cv::Point2d& tip, const Vector4& p) {
+struct Problem {
+  const PatchTemplate& left;
+  cv::Point2d tip;
+  const ImageLayers& right;
+  double focal_px;
+};
+
+CellWarp warp_cell(const PatchCell& cell, const Problem& problem, const Vector4& p) {
   CellWarp warp;
-  const double d = p[0] + p[1] * (center.x - tip.x) + p[2] * (center.y - tip.y);
+  const cv::Point2d center = cell.center_px, tip = problem.tip;
+  // A surface that stands h px out of the plane is nearer by h z / f, so its disparity larger by d h / f.
+  const double nearer = 1 + cell.height_px / problem.focal_px;
+  const double d = nearer * (p[0] + p[1] * (center.x - tip.x) + p[2] * (center.y - tip.y));
   warp.center_px = {center.x - d, center.y + p[3]};
   warp.linear = {1 - p[1], -p[2], 0, 1};
   return warp;
 }
 
-System assemble(const std::vector<PatchCell>& cells, const cv::Point2d& tip, const ImageLayers& right, int level,
-                const Vector4& p) {
+System assemble(const Problem& problem, int level, const Vector4& p) {
   System system;
-  for (const PatchCell& cell : cells) {
-    const CellEquations e = cell_equations(cell, right, level, warp_cell(cell.center_px, tip, p));
+  const cv::Point2d tip = problem.tip;
+  for (const PatchCell& cell : problem.left.cells[static_cast<size_t>(level)]) {
+    const CellEquations e = cell_equations(cell, problem.right, level, warp_cell(cell, problem, p));
     Eigen::Matrix<double, 2, 4> jacobian;
     jacobian << -1, -(cell.center_px.x - tip.x), -(cell.center_px.y - tip.y), 0, 0, 0, 0, 1;
     system.normal += jacobian.transpose() * e.normal * jacobian;
@@ -48,11 +58,11 @@ System assemble(const std::vector<PatchCell>& cells, const cv::Point2d& tip, con
 }
 
 /// Best disparity of a coarse search along the row, where Gauss-Newton alone could settle on the wrong edge.
-double search_disparity(const PatchTemplate& left, const cv::Point2d& tip, const ImageLayers& right, double guess) {
+double search_disparity(const Problem& problem, double guess) {
   const int level = ImageLayers::kLevels - 1;
   double best = guess, best_agreement = -1;
   for (double d = guess - 12; d <= guess + 12; d += 2) {
-    const System system = assemble(left.cells[level], tip, right, level, Vector4(d, 0, 0, 0));
+    const System system = assemble(problem, level, Vector4(d, 0, 0, 0));
     if (system.agreement() > best_agreement) best_agreement = system.agreement(), best = d;
   }
   return best;
@@ -61,14 +71,14 @@ double search_disparity(const PatchTemplate& left, const cv::Point2d& tip, const
 }  // namespace
 
 std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const cv::Point2d& tip_px,
-                                                const ImageLayers& right, double guess_px) {
-  Vector4 p(search_disparity(left, tip_px, right, guess_px), 0, 0, 0);
+                                                const ImageLayers& right, double guess_px, double focal_px) {
+  const Problem problem{left, tip_px, right, focal_px};
+  Vector4 p(search_disparity(problem, guess_px), 0, 0, 0);
   Matrix4 prior = Matrix4::Zero();
   System system;
   for (int level = ImageLayers::kLevels - 1; level >= 0; --level) {
-    const auto& cells = left.cells[static_cast<size_t>(level)];
     for (int pass = 0; pass < 8; ++pass) {
-      system = assemble(cells, tip_px, right, level, p);
+      system = assemble(problem, level, p);
       prior.diagonal() << 0, 1 / std::pow(kSlopeDeviation, 2), 1 / std::pow(kSlopeDeviation, 2),
           1 / std::pow(kRowDeviation_px, 2);
       prior *= kCorrelatedNoise;
@@ -84,7 +94,7 @@ std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const
   plane.disparity = p.head<3>();
   plane.row_offset_px = p[3];
   plane.agreement = system.agreement();
-  const double noise = std::max(1.0, system.squared_error / std::max(system.weight, 1.0));
+  const double noise = std::max(0.1, system.squared_error / std::max(system.weight, 1.0));
   plane.disparity_deviation_px = std::sqrt(kCorrelatedNoise * noise * (system.normal + prior).inverse()(0, 0));
   return plane;
 }

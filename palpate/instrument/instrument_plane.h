@@ -6,7 +6,8 @@
 
 namespace palpate {
 
-/// Disparity of the visible side of the instrument: a straight body has a disparity that is linear in the image.
+/// Disparity of the plane through the outline of the instrument (its axis, where it is round): a straight body has a
+/// disparity that is linear in the image.
 struct InstrumentPlane {
   cv::Point2d origin_px;                                ///< the tip in the left image
   Eigen::Vector3d disparity = Eigen::Vector3d::Zero();  ///< at the origin, px; its slope in x and in y, px/px
@@ -22,6 +23,6 @@ struct InstrumentPlane {
 /// Aligns the left template with the right image, starting at `guess_px` of disparity at the tip (searched +- 12 px
 /// around). Nothing when too little of it fits.
 std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const cv::Point2d& tip_px,
-                                                const ImageLayers& right, double guess_px);
+                                                const ImageLayers& right, double guess_px, double focal_px);
 
 }  // namespace palpate

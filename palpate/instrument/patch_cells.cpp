@@ -1,7 +1,7 @@
 #include "palpate/instrument/patch_cells.h"
 
 #include <algorithm>
-#include <map>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 namespace palpate {
@@ -10,20 +10,63 @@ namespace {
 
 constexpr int kCell = 12;              // px of the level that a cell belongs to
 constexpr float kBrightnessNoise = 3;  // grey levels
-constexpr float kMetalNoise = 24;      // of 255; colour is recorded at half resolution
+constexpr float kMetalNoise = 80;      // of 255; colour is recorded at half resolution
 constexpr float kOutlierAt = 3;        // noise levels at which a residual loses half its weight
 
-float sample_bilinear(const cv::Mat& image, float x, float y, bool& inside) {
+constexpr float kOutside = -1e9f;
+constexpr size_t kLeastSamples = 12;
+
+/// Negative outside the image; the layers are never negative.
+float sample_bilinear(const cv::Mat& image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  if (!(x >= 0) || !(y >= 0) || ix + 1 >= image.cols || iy + 1 >= image.rows) {
-    inside = false;
-    return 0;
-  }
+  if (!(x >= 0) || !(y >= 0) || ix + 1 >= image.cols || iy + 1 >= image.rows) return -1;
   const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
   const float* a = image.ptr<float>(iy) + ix;
   const float* b = image.ptr<float>(iy + 1) + ix;
   return (1 - fy) * (a[0] + fx * (a[1] - a[0])) + fy * (b[0] + fx * (b[1] - b[0]));
 }
+
+CellSample sample_at(const cv::Mat& image, int x, int y, int step, const cv::Point2d& from_center) {
+  const float per_px = 0.5f / static_cast<float>(step);
+  return {static_cast<float>(from_center.x), static_cast<float>(from_center.y), image.at<float>(y, x),
+          per_px * (image.at<float>(y, x + 1) - image.at<float>(y, x - 1)),
+          per_px * (image.at<float>(y + 1, x) - image.at<float>(y - 1, x))};
+}
+
+/// Edges of the instrument along its axis, from the tip backwards.
+class Profile {
+ public:
+  Profile(const cv::Mat& mask, const ImageTip& tip, const cv::Rect& region, double length_px)
+      : tip_(tip), low_(static_cast<size_t>(length_px) + 1, 1e9), high_(low_.size(), -1e9) {
+    for (int y = 0; y < mask.rows; ++y)
+      for (int x = 0; x < mask.cols; ++x) {
+        if (!mask.at<uchar>(y, x)) continue;
+        const auto [back, across] = coordinates({x + region.x * 1.0, y + region.y * 1.0});
+        if (back < 0 || back >= static_cast<double>(low_.size())) continue;
+        const size_t slice = static_cast<size_t>(back);
+        low_[slice] = std::min(low_[slice], across);
+        high_[slice] = std::max(high_[slice], across);
+      }
+  }
+
+  /// Of a round body's surface over the plane through its outline.
+  double height_px(const cv::Point2d& px) const {
+    const auto [back, across] = coordinates(px);
+    const size_t slice = static_cast<size_t>(std::clamp(back, 0.0, static_cast<double>(low_.size()) - 1));
+    const double radius = 0.5 * (high_[slice] - low_[slice] + 1);
+    const double aside = across - 0.5 * (high_[slice] + low_[slice]);
+    return std::sqrt(std::max(0.0, radius * radius - aside * aside));
+  }
+
+ private:
+  std::pair<double, double> coordinates(const cv::Point2d& px) const {
+    const cv::Point2d from_tip = px - tip_.tip_px;
+    return {-from_tip.dot(tip_.axis), from_tip.y * tip_.axis.x - from_tip.x * tip_.axis.y};
+  }
+
+  ImageTip tip_;
+  std::vector<double> low_, high_;
+};
 
 }  // namespace
 
@@ -48,101 +91,91 @@ ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const Segmen
 PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, const ImageTip& tip, double length_px) {
   PatchTemplate result;
   if (layers.region.area() == 0) return result;
+  const Profile profile(mask(layers.region), tip, layers.region, length_px);
   cv::Mat inner, outer;
   cv::erode(mask(layers.region), inner, cv::getStructuringElement(cv::MORPH_ELLIPSE, {7, 7}));
   cv::dilate(mask(layers.region), outer, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
-  for (int level = 0; level < ImageLayers::kLevels; ++level) {
-    const cv::Mat& brightness = layers.brightness[static_cast<size_t>(level)];
-    const cv::Mat& metal = layers.metal[static_cast<size_t>(level)];
+  for (size_t level = 0; level < ImageLayers::kLevels; ++level) {
+    const cv::Mat& brightness = layers.brightness[level];
     const int step = 1 << level;
-    std::map<std::pair<int, int>, PatchCell> cells;
-    for (int y = 1; y + 1 < brightness.rows; ++y)
-      for (int x = 1; x + 1 < brightness.cols; ++x) {
-        const cv::Point at(std::min(x * step, inner.cols - 1), std::min(y * step, inner.rows - 1));
-        if (!outer.at<uchar>(at)) continue;
-        const cv::Point2d full(x * step + layers.region.x, y * step + layers.region.y);
-        const double back = (tip.tip_px - full).dot(tip.axis);
-        if (back > length_px) continue;
-        CellSample sample;
-        sample.outline = !inner.at<uchar>(at);
-        const cv::Mat& image = sample.outline ? metal : brightness;
-        sample.value = image.at<float>(y, x);
-        const float per_px = 0.5f / static_cast<float>(step);
-        sample.gradient_x = per_px * (image.at<float>(y, x + 1) - image.at<float>(y, x - 1));
-        sample.gradient_y = per_px * (image.at<float>(y + 1, x) - image.at<float>(y - 1, x));
-        PatchCell& cell = cells[{y / kCell, x / kCell}];
-        if (cell.samples.empty())
-          cell.center_px = {(x / kCell + 0.5) * kCell * step + layers.region.x,
-                            (y / kCell + 0.5) * kCell * step + layers.region.y};
-        sample.dx = static_cast<float>(full.x - cell.center_px.x);
-        sample.dy = static_cast<float>(full.y - cell.center_px.y);
-        cell.samples.push_back(sample);
+    const int columns = brightness.cols / kCell + 1, rows = brightness.rows / kCell + 1;
+    for (int cell_y = 0; cell_y < rows; ++cell_y)
+      for (int cell_x = 0; cell_x < columns; ++cell_x) {
+        const cv::Rect square = cv::Rect(cell_x * kCell, cell_y * kCell, kCell, kCell) &
+                                cv::Rect(1, 1, brightness.cols - 2, brightness.rows - 2);
+        PatchCell inside, outline;
+        outline.outline = true;
+        inside.center_px = outline.center_px = {(cell_x + 0.5) * kCell * step + layers.region.x,
+                                                (cell_y + 0.5) * kCell * step + layers.region.y};
+        for (int y = square.y; y < square.br().y; ++y)
+          for (int x = square.x; x < square.br().x; ++x) {
+            const cv::Point at(std::min(x * step, inner.cols - 1), std::min(y * step, inner.rows - 1));
+            if (!outer.at<uchar>(at)) continue;
+            const cv::Point2d full(x * step + layers.region.x, y * step + layers.region.y);
+            if ((tip.tip_px - full).dot(tip.axis) > length_px) continue;
+            const bool is_inside = inner.at<uchar>(at) != 0;
+            PatchCell& cell = is_inside ? inside : outline;
+            if (is_inside) cell.height_px += profile.height_px(full);
+            cell.samples.push_back(
+                sample_at(is_inside ? brightness : layers.metal[level], x, y, step, full - cell.center_px));
+          }
+        for (PatchCell* cell : {&inside, &outline}) {
+          if (cell->samples.size() < kLeastSamples) continue;
+          cell->height_px /= static_cast<double>(cell->samples.size());
+          result.cells[level].push_back(std::move(*cell));
+        }
       }
-    for (auto& [where, cell] : cells)
-      if (cell.samples.size() >= 12) result.cells[static_cast<size_t>(level)].push_back(std::move(cell));
   }
   return result;
 }
 
 CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp) {
-  const cv::Mat& brightness = layers.brightness[static_cast<size_t>(level)];
-  const cv::Mat& metal = layers.metal[static_cast<size_t>(level)];
+  const cv::Mat& image =
+      cell.outline ? layers.metal[static_cast<size_t>(level)] : layers.brightness[static_cast<size_t>(level)];
+  const float per_noise = 1 / (cell.outline ? kMetalNoise : kBrightnessNoise);
   const float scale = 1.0f / static_cast<float>(1 << level);
-  const float cx = static_cast<float>(warp.center_px.x - layers.region.x);
-  const float cy = static_cast<float>(warp.center_px.y - layers.region.y);
-  const float a00 = static_cast<float>(warp.linear(0, 0)), a01 = static_cast<float>(warp.linear(0, 1));
-  const float a10 = static_cast<float>(warp.linear(1, 0)), a11 = static_cast<float>(warp.linear(1, 1));
+  const float cx = scale * static_cast<float>(warp.center_px.x - layers.region.x);
+  const float cy = scale * static_cast<float>(warp.center_px.y - layers.region.y);
+  const float a00 = scale * static_cast<float>(warp.linear(0, 0)), a01 = scale * static_cast<float>(warp.linear(0, 1));
+  const float a10 = scale * static_cast<float>(warp.linear(1, 0)), a11 = scale * static_cast<float>(warp.linear(1, 1));
 
-  // First the cell's brightness offset, as the median would be too slow: the mean, then once more without outliers.
   thread_local std::vector<float> residual;
   residual.resize(cell.samples.size());
   float sum = 0;
-  int inner = 0;
+  int inside = 0;
   for (size_t i = 0; i < cell.samples.size(); ++i) {
     const CellSample& s = cell.samples[i];
-    bool inside = true;
-    const float value = sample_bilinear(s.outline ? metal : brightness, scale * (cx + a00 * s.dx + a01 * s.dy),
-                                        scale * (cy + a10 * s.dx + a11 * s.dy), inside);
-    residual[i] = inside ? value - s.value : std::numeric_limits<float>::quiet_NaN();
-    if (inside && !s.outline) sum += residual[i], ++inner;
+    const float value = sample_bilinear(image, cx + a00 * s.dx + a01 * s.dy, cy + a10 * s.dx + a11 * s.dy);
+    residual[i] = value < 0 ? kOutside : per_noise * (value - s.value);
+    if (value >= 0) sum += residual[i], ++inside;
   }
-  const float offset = inner > 0 ? sum / static_cast<float>(inner) : 0;
+  const float offset = cell.outline || inside == 0 ? 0 : sum / static_cast<float>(inside);
 
   CellEquations e;
-  double bxx = 0, bxy = 0, byy = 0, bx = 0, by = 0, bxr = 0, byr = 0, br = 0, bw = 0;
+  float xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0, xr = 0, yr = 0, r1 = 0, w1 = 0, rr = 0, kept = 0, full = 0;
   for (size_t i = 0; i < cell.samples.size(); ++i) {
     const CellSample& s = cell.samples[i];
-    const float noise = s.outline ? kMetalNoise : kBrightnessNoise;
-    const float gx = s.gradient_x / noise, gy = s.gradient_y / noise;
+    const float gx = per_noise * s.gradient_x, gy = per_noise * s.gradient_y;
     const float energy = gx * gx + gy * gy;
-    e.full_information += energy;
-    if (std::isnan(residual[i])) continue;
-    const float r = (s.outline ? residual[i] : residual[i] - offset) / noise;
-    const float ratio = r / kOutlierAt;
-    const float w = 1 / (1 + ratio * ratio);
-    e.information += w * energy;
-    e.squared_error += w * r * r;
-    e.weight += w;
-    if (s.outline) {
-      e.normal(0, 0) += w * gx * gx;
-      e.normal(0, 1) += w * gx * gy;
-      e.normal(1, 1) += w * gy * gy;
-      e.right.x() -= w * gx * r;
-      e.right.y() -= w * gy * r;
-    } else {
-      bxx += w * gx * gx, bxy += w * gx * gy, byy += w * gy * gy;
-      bx += w * gx, by += w * gy, br += w * r, bw += w;
-      bxr += w * gx * r, byr += w * gy * r;
-    }
+    full += energy;
+    if (residual[i] == kOutside) continue;
+    const float r = residual[i] - offset;
+    const float w = 1 / (1 + r * r / (kOutlierAt * kOutlierAt));
+    kept += w * energy;
+    xx += w * gx * gx, xy += w * gx * gy, yy += w * gy * gy;
+    x1 += w * gx, y1 += w * gy, r1 += w * r, w1 += w;
+    xr += w * gx * r, yr += w * gy * r, rr += w * r * r;
   }
-  if (bw > 0) {
-    e.normal(0, 0) += bxx - bx * bx / bw;
-    e.normal(0, 1) += bxy - bx * by / bw;
-    e.normal(1, 1) += byy - by * by / bw;
-    e.right.x() -= bxr - bx * br / bw;
-    e.right.y() -= byr - by * br / bw;
+  if (!cell.outline && w1 > 0) {
+    xx -= x1 * x1 / w1, xy -= x1 * y1 / w1, yy -= y1 * y1 / w1;
+    xr -= x1 * r1 / w1, yr -= y1 * r1 / w1;
   }
-  e.normal(1, 0) = e.normal(0, 1);
+  e.normal << xx, xy, xy, yy;
+  e.right << -xr, -yr;
+  e.information = kept;
+  e.full_information = full;
+  e.squared_error = rr;
+  e.weight = w1;
   return e;
 }
 

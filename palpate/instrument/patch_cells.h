@@ -25,12 +25,13 @@ struct CellSample {
   float dx, dy;
   float value;
   float gradient_x, gradient_y;
-  bool outline;  ///< value is metalness, otherwise brightness
 };
 
 /// A few pixels that move together: the unit in which robust weights and brightness offsets are judged.
 struct PatchCell {
   cv::Point2d center_px;
+  bool outline = false;  ///< its values are metalness, otherwise brightness
+  double height_px = 0;  ///< of the visible surface over the plane of the outline: an instrument is round
   std::vector<CellSample> samples;
 };
 

@@ -27,7 +27,8 @@ struct Eye {
   const Rectification& rectification;
   double shift_mm;
 
-  Vec3 point(const InstrumentPlane& plane, const cv::Point2d& px) const {
+  /// Point of the keyframe's instrument at a pixel of this eye.
+  Vec3 point(const InstrumentPlane& plane, const cv::Point2d& px, double height_px) const {
     const double f = rectification.focal_px;
     double disparity = plane.disparity_at(px);
     double left_x = px.x;
@@ -35,7 +36,7 @@ struct Eye {
       disparity = plane.disparity_at(px) / (1 - plane.disparity[1]);
       left_x += disparity;
     }
-    const double z = f * rectification.baseline_mm / std::max(disparity, 0.1);
+    const double z = f * rectification.baseline_mm / std::max(disparity * (1 + height_px / f), 0.1);
     return {(left_x - rectification.principal_x_px) * z / f, (px.y - rectification.principal_y_px) * z / f, z};
   }
 
@@ -54,11 +55,11 @@ void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const Instrume
              const ImageLayers& layers, int level, const Vector6& p, System& system) {
   const double f = eye.rectification.focal_px;
   for (const PatchCell& cell : cells) {
-    const Vec3 before = eye.point(keyframe.plane, cell.center_px);
+    const Vec3 before = eye.point(keyframe.plane, cell.center_px, cell.height_px);
     const Vec3 now = moved(before, keyframe.tip_mm, p);
     if (now.z() < 5) continue;
     const auto goes_to = [&](const cv::Point2d& px) {
-      const Vec3 x = eye.point(keyframe.plane, px);
+      const Vec3 x = eye.point(keyframe.plane, px, cell.height_px);
       return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x);
     };
     CellWarp warp;
@@ -113,7 +114,7 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
   motion.translation_mm = p.head<3>();
   motion.rotation_rad = p.tail<3>();
   motion.agreement = system.agreement();
-  const double noise = std::max(1.0, system.squared_error / std::max(system.weight, 1.0));
+  const double noise = std::max(0.1, system.squared_error / std::max(system.weight, 1.0));
   motion.covariance_mm2 = kCorrelatedNoise * noise * (system.normal + prior).inverse().topLeftCorner<3, 3>();
   return motion;
 }

@@ -68,7 +68,7 @@ std::optional<Detection> detect(const EyeView& left, const EyeView& right, const
   if (guess < 1 || rows > 4 + 0.15 * left.tip->width_px || left.tip->axis.dot(right.tip->axis) < 0.9) return {};
   Detection detection;
   detection.left_template = make_template(left.layers, left.mask, *left.tip, followed_length_px(*left.tip));
-  const auto plane = match_instrument(detection.left_template, left.tip->tip_px, right.layers, guess);
+  const auto plane = match_instrument(detection.left_template, left.tip->tip_px, right.layers, guess, r.focal_px);
   if (!plane) return {};
   detection.plane = *plane;
   detection.tip_mm = rectified_point(r, left.tip->tip_px, plane->disparity[0]);
