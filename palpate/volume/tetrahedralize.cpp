@@ -16,6 +16,7 @@
 #include <unordered_map>
 
 #include "palpate/core/errors.h"
+#include "palpate/volume/fit_boundary.h"
 #include "palpate/volume/inside.h"
 #include "palpate/volume/mesh_quality.h"
 
@@ -30,7 +31,7 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
 constexpr double kWorstDihedral_deg = 10;
-constexpr double kAimedDihedral_deg = 14;  // perturbation and exudation stop here
+constexpr double kAimedDihedral_deg = 12;  // perturbation and exudation stop here
 constexpr double kCountTolerance = 0.1;
 constexpr int kMostMeshings = 8;
 
@@ -100,12 +101,10 @@ TetMesh mesh_of(const Complex& complex) {
   return mesh;
 }
 
-/// One Delaunay refinement with cells of `size_mm`, slivers perturbed and exuded. No clock decides anything here, and
-/// the random numbers start anew, so that the same input gives the same mesh.
-TetMesh mesh_once(const Domain& domain, const std::vector<Vec3>& start, double size_mm,
-                  const std::optional<MeshFocus>& focus) {
+/// One Delaunay refinement with cells of `size_mm`.
+Complex refine(const Domain& domain, const std::vector<Vec3>& start, double size_mm,
+               const std::optional<MeshFocus>& focus) {
   namespace P = CGAL::parameters;
-  CGAL::get_default_random() = CGAL::Random(0);
   const SizeField cell_size{size_mm, focus}, facet_size{0.9 * size_mm, focus}, distance{0.12 * size_mm, focus};
   const Criteria criteria(P::facet_angle = 25, P::facet_size = facet_size, P::facet_distance = distance,
                           P::cell_radius_edge_ratio = 2, P::cell_size = cell_size);
@@ -117,10 +116,47 @@ TetMesh mesh_once(const Domain& domain, const std::vector<Vec3>& start, double s
     complex.set_index(vertex, domain.index_from_surface_patch_index({0, 1}));
   }
   CGAL::refine_mesh_3(complex, domain, criteria, P::no_perturb(), P::no_exude(), P::manifold());
+  return complex;
+}
+
+/// Slivers perturbed and exuded, boundary fitted. No clock decides anything here, and the random numbers start anew, so
+/// that the same input gives the same mesh.
+TetMesh finish(Complex& complex, const Domain& domain, const InsideTest& inside) {
+  namespace P = CGAL::parameters;
+  CGAL::get_default_random() = CGAL::Random(0);
   CGAL::perturb_mesh_3(complex, domain, P::sliver_bound = kAimedDihedral_deg);
   CGAL::exude_mesh_3(complex, P::sliver_bound = kAimedDihedral_deg);
-  return largest_piece(mesh_of(complex));
+  TetMesh mesh = without_hinges(mesh_of(complex));
+  fit_boundary(mesh, inside, kWorstDihedral_deg + 0.5);
+  return mesh;
 }
+
+/// Next cell size to try: the count is close to a power law of the size with exponent -3; the last two trials correct
+/// it.
+class SizeSearch {
+ public:
+  SizeSearch(double guess_mm, int elements) : size_mm_(guess_mm), elements_(elements) {}
+
+  double size_mm() const { return size_mm_; }
+
+  void tried(int count) {
+    if (last_count_ > 0 && count > 0 && count != last_count_ && size_mm_ != last_size_mm_)
+      exponent_ =
+          std::clamp(std::log(static_cast<double>(last_count_) / count) / std::log(size_mm_ / last_size_mm_), 2.0, 4.5);
+    last_count_ = count;
+    last_size_mm_ = size_mm_;
+    size_mm_ *= count > 0 ? std::pow(static_cast<double>(count) / elements_, 1 / exponent_) : 0.5;
+  }
+
+  /// The count was right but the angles were not: a slightly different size makes another mesh.
+  void nudge() { size_mm_ = last_size_mm_ * 0.99; }
+
+ private:
+  double size_mm_;
+  int elements_;
+  double exponent_ = 3, last_size_mm_ = 0;
+  int last_count_ = 0;
+};
 
 }  // namespace
 
@@ -139,34 +175,38 @@ TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::opti
                    box.most.y() + margin, box.most.z() + margin),
       CGAL::parameters::relative_error_bound = 1e-5);
 
-  // Number of elements against cell size is close to a power law of exponent -3; each meshing corrects the law.
-  const double first_guess = std::cbrt(1.6 * volume / elements);
-  const std::vector<Vec3> start = starting_points(closed_body, inside, 2.5 * first_guess);
-  double size = first_guess, last_size = 0, exponent = 3;
-  int last_count = 0;
+  const double guess_mm = std::cbrt(4.8 * volume / elements);
+  const std::vector<Vec3> start = starting_points(closed_body, inside, 1.7 * guess_mm);
+  const auto error = [elements](size_t count) {
+    return std::abs(static_cast<double>(count) - elements) / static_cast<double>(elements);
+  };
+  SizeSearch search(guess_mm, elements);
   TetMesh best;
-  double best_cost = 1e300, best_size = 0, best_dihedral = 0;
-  for (int meshing = 0; meshing < kMostMeshings; ++meshing) {
-    TetMesh mesh = mesh_once(domain, start, size, focus);
-    const auto count = static_cast<int>(mesh.tetrahedra.size());
-    const double error = std::abs(count - elements) / static_cast<double>(elements);
-    const double dihedral = count > 0 ? smallest_dihedral_deg(mesh) : 0;
-    const double cost =
-        std::max(0.0, error - kCountTolerance) * 1e3 + std::max(0.0, kWorstDihedral_deg - dihedral) + error;
-    printf("  meshing %d size %.3f count %d dihedral %.2f\n", meshing, size, count, dihedral);
-    if (cost < best_cost) {
+  MeshReport best_report;
+  double best_fault = 1e300;
+  for (int meshing = 1; meshing <= kMostMeshings; ++meshing) {
+    const double size_mm = search.size_mm();
+    Complex complex = refine(domain, start, size_mm, focus);
+    const size_t refined = complex.number_of_cells_in_complex();
+    const bool is_near = error(refined) <= 0.7 * kCountTolerance;
+    search.tried(static_cast<int>(refined));
+    if (refined == 0 || (!is_near && meshing < kMostMeshings)) continue;
+    TetMesh mesh = finish(complex, domain, inside);
+    const double dihedral = smallest_dihedral_deg(mesh);
+    const bool has_count = error(mesh.tetrahedra.size()) <= kCountTolerance;
+    const double fault =
+        (has_count ? 0 : 100 * error(mesh.tetrahedra.size())) + std::max(0.0, kWorstDihedral_deg - dihedral);
+    if (fault < best_fault) {
+      best_fault = fault;
+      best_report = {static_cast<int>(mesh.tetrahedra.size()), dihedral, size_mm};
       best = std::move(mesh);
-      best_cost = cost, best_size = size, best_dihedral = dihedral;
     }
-    if (error <= kCountTolerance && dihedral >= kWorstDihedral_deg) break;
-    if (last_count > 0 && count > 0 && count != last_count)
-      exponent = std::clamp(std::log(static_cast<double>(last_count) / count) / std::log(size / last_size), 2.0, 4.5);
-    last_count = count, last_size = size;
-    size = count == 0 ? size / 2 : size * std::pow(static_cast<double>(count) / elements, 1 / exponent);
-    if (error <= kCountTolerance) size *= meshing % 2 ? 0.985 : 1.015;
+    if (best_fault == 0) break;
+    if (has_count) search.nudge();
   }
-  if (best.tetrahedra.empty()) throw BadInput("the body cannot be filled with tetrahedra: it has no inside");
-  if (report) *report = {static_cast<int>(best.tetrahedra.size()), best_dihedral, best_size};
+  if (best.tetrahedra.empty())
+    throw BadInput(fmt::format("a body of {:.3g} mm^3 cannot be filled with {} tetrahedra", volume, elements));
+  if (report) *report = best_report;
   return best;
 }
 
