@@ -163,7 +163,6 @@ std::unique_ptr<Source> open_source(const std::filesystem::path& path, const std
     if (std::filesystem::file_size(path) == 0) throw BadInput(fmt::format("recording.{}: {} is empty", key, name));
     if (is_image_name(path)) return std::make_unique<ImageFiles>(std::vector{path}, key);
     capture.open(name, cv::CAP_FFMPEG);
-    if (!capture.isOpened()) capture.open(name);
   }
   if (!capture.isOpened())
     throw BadInput(fmt::format("recording.{}: {} cannot be opened as a {}", key, name,
