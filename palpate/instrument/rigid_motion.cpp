@@ -13,6 +13,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kRotationDeviation_rad = 0.02;  // an instrument in a trocar mostly translates
 constexpr double kLeastAgreement = 0.35;
+constexpr double kLeastMetal = 0.6;
 constexpr double kCorrelatedNoise = 12;
 
 struct System {
@@ -51,6 +52,32 @@ Vec3 moved(const Vec3& point, const Vec3& tip, const Vector6& p) {
   return point + p.head<3>() + p.tail<3>().cross(point - tip);
 }
 
+CellWarp warp_of(const PatchCell& cell, const Eye& eye, const InstrumentKeyframe& keyframe, const Vector6& p) {
+  const auto goes_to = [&](const cv::Point2d& px) {
+    const Vec3 x = eye.point(keyframe.plane, px, cell.height_px);
+    return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x);
+  };
+  CellWarp warp;
+  warp.center_px = goes_to(cell.center_px);
+  const cv::Point2d along_x = goes_to(cell.center_px + cv::Point2d(4, 0)) - warp.center_px;
+  const cv::Point2d along_y = goes_to(cell.center_px + cv::Point2d(0, 4)) - warp.center_px;
+  warp.linear = {along_x.x / 4, along_y.x / 4, along_x.y / 4, along_y.y / 4};
+  return warp;
+}
+
+/// Share of the cells inside the outline that still lie on metal.
+double metal_share(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
+                   const ImageLayers& layers, const Vector6& p) {
+  int inside = 0, metal = 0;
+  for (const PatchCell& cell : cells) {
+    if (cell.outline) continue;
+    ++inside;
+    const cv::Point at(warp_of(cell, eye, keyframe, p).center_px - cv::Point2d(layers.region.tl()));
+    if (cv::Rect({}, layers.region.size()).contains(at) && layers.metal[0].at<float>(at) >= 128) ++metal;
+  }
+  return inside > 0 ? static_cast<double>(metal) / inside : 0;
+}
+
 void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
              const ImageLayers& layers, int level, const Vector6& p, System& system) {
   const double f = eye.rectification.focal_px;
@@ -58,17 +85,7 @@ void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const Instrume
     const Vec3 before = eye.point(keyframe.plane, cell.center_px, cell.height_px);
     const Vec3 now = moved(before, keyframe.tip_mm, p);
     if (now.z() < 5) continue;
-    const auto goes_to = [&](const cv::Point2d& px) {
-      const Vec3 x = eye.point(keyframe.plane, px, cell.height_px);
-      return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x);
-    };
-    CellWarp warp;
-    warp.center_px = goes_to(cell.center_px);
-    const cv::Point2d along_x = goes_to(cell.center_px + cv::Point2d(4, 0)) - warp.center_px;
-    const cv::Point2d along_y = goes_to(cell.center_px + cv::Point2d(0, 4)) - warp.center_px;
-    warp.linear = {along_x.x / 4, along_y.x / 4, along_x.y / 4, along_y.y / 4};
-
-    const CellEquations e = cell_equations(cell, layers, level, warp);
+    const CellEquations e = cell_equations(cell, layers, level, warp_of(cell, eye, keyframe, p));
     Eigen::Matrix<double, 2, 3> projection;
     projection << f / now.z(), 0, -f * (now.x() - eye.shift_mm) / (now.z() * now.z()), 0, f / now.z(),
         -f * now.y() / (now.z() * now.z());
@@ -109,7 +126,10 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
       if (!p.allFinite()) return {};
       if (step.head<3>().norm() < 0.002) break;
     }
-  if (system.agreement() < kLeastAgreement) return {};
+  if (system.agreement() < kLeastAgreement ||
+      metal_share(keyframe.left.cells[0], left_eye, keyframe, left, p) < kLeastMetal ||
+      metal_share(keyframe.right.cells[0], right_eye, keyframe, right, p) < kLeastMetal)
+    return {};
   RigidMotion motion;
   motion.translation_mm = p.head<3>();
   motion.rotation_rad = p.tail<3>();

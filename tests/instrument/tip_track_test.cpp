@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "palpate/core/errors.h"
+#include "palpate/instrument/tip_tracker.h"
+#include "tests/instrument/drawn_scene.h"
+
+namespace palpate {
+namespace {
+
+class TipTrackFile : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& text) {
+    file_ = std::filesystem::temp_directory_path() /
+            (std::string("palpate_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv");
+    std::ofstream(file_) << text;
+    return file_;
+  }
+  void TearDown() override { std::filesystem::remove(file_); }
+
+  std::string complaint(const std::string& text) {
+    try {
+      read_tip_track(write(text));
+    } catch (const BadInput& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+ private:
+  std::filesystem::path file_;
+};
+
+constexpr const char* kHeader = "frame,time_s,x_mm,y_mm,z_mm\n";
+
+TEST_F(TipTrackFile, ReadsEveryRowWithAndWithoutClosed) {
+  const TipTrack plain = read_tip_track(write(std::string(kHeader) + "0,0,1,2,3\r\n\n2, 0.08 ,1.5,-2,3e1\n"));
+  ASSERT_EQ(plain.rows.size(), 2u);
+  EXPECT_EQ(plain.rows.at(2).tip_mm, Vec3(1.5, -2, 30));
+  EXPECT_DOUBLE_EQ(plain.rows.at(2).time_s, 0.08);
+  EXPECT_FALSE(plain.rows.at(0).closed);
+  const TipTrack closed = read_tip_track(write("frame,time_s,x_mm,y_mm,z_mm,closed\n7,0.28,1,2,3,1\n8,0.32,1,2,3,0\n"));
+  EXPECT_TRUE(*closed.rows.at(7).closed);
+  EXPECT_FALSE(*closed.rows.at(8).closed);
+}
+
+TEST_F(TipTrackFile, SaysWhichLineIsWrongAndWhy) {
+  EXPECT_THROW(read_tip_track("/nowhere/tip.csv"), BadInput);
+  EXPECT_NE(complaint("").find("header"), std::string::npos);
+  EXPECT_NE(complaint("frame,x,y,z\n").find("header"), std::string::npos);
+  EXPECT_NE(complaint(kHeader).find("no rows"), std::string::npos);
+  const std::string line = complaint(std::string(kHeader) + "0,0,1,2,3\n1,0.04,1,two,3\n");
+  EXPECT_NE(line.find(":3:"), std::string::npos) << line;
+  EXPECT_NE(line.find("y_mm is 'two'"), std::string::npos) << line;
+  EXPECT_NE(complaint(std::string(kHeader) + "0,0,1,2\n").find("4 values"), std::string::npos);
+  EXPECT_NE(complaint(std::string(kHeader) + "0,0,1,2,nan\n").find("finite"), std::string::npos);
+  EXPECT_NE(complaint(std::string(kHeader) + "0.5,0,1,2,3\n").find("whole number"), std::string::npos);
+  EXPECT_NE(complaint(std::string(kHeader) + "0,0,1,2,3\n0,0,1,2,3\n").find("twice"), std::string::npos);
+  EXPECT_NE(complaint("frame,time_s,x_mm,y_mm,z_mm,closed\n0,0,1,2,3,2\n").find("closed"), std::string::npos);
+}
+
+TEST_F(TipTrackFile, ReplacesTheImages) {
+  InstrumentOptions options;
+  options.track = write("frame,time_s,x_mm,y_mm,z_mm,closed\n1,0.04,1,2,80,0\n2,0.08,1.2,2,80,1\n4,0.16,2,2,81,1\n");
+  const auto scene = test::draw_pair({.instrument = false}, {}, 0);
+  TipTracker tracker(options, test::drawn_rectification(), scene, {});
+  RectifiedPair pair = scene;
+  std::vector<TipObservation> seen;
+  for (int frame = 0; frame < 5; ++frame) {
+    pair.index = frame;
+    seen.push_back(tracker.update(pair));
+    if (frame == 2) tracker.mark();
+  }
+  EXPECT_FALSE(seen[0].visible);
+  EXPECT_FALSE(seen[3].visible);
+  EXPECT_EQ(seen[2].tip_mm, Vec3(1.2, 2, 80));
+  EXPECT_TRUE(*seen[2].closed);
+  EXPECT_NEAR(seen[2].velocity_mm_per_s.x(), 5, 1e-9);
+  EXPECT_FALSE(seen[2].since_mark_mm);
+  ASSERT_TRUE(seen[4].since_mark_mm);
+  EXPECT_NEAR((*seen[4].since_mark_mm - Vec3(0.8, 0, 1)).norm(), 0, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate
