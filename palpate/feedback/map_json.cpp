@@ -8,6 +8,7 @@ namespace palpate {
 std::string map_json(const TissueMap& map, const Rectification& rectification) {
   const MapReport& r = map.report;
   nlohmann::ordered_json json;
+  json["frame"] = map.frame;
   json["counts"] = {{"matched_points", r.matched_points},
                     {"cloud_points", map.cloud.size()},
                     {"surface_vertices", map.surface.vertices_mm.size()},

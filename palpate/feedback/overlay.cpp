@@ -104,10 +104,9 @@ void describe(Settings& settings, OverlayOptions& o) {
   settings.number("chart_duration_s", o.chart_duration_s, {.least = 1, .most = 600}, "time that the chart shows");
 }
 
-OverlayPainter::OverlayPainter(const Rectification& rectification, const TetMesh& mesh, const TissueOptions& tissue,
+OverlayPainter::OverlayPainter(const Rectification& rectification, const TissueOptions& tissue,
                                const OverlayOptions& options)
     : rectification_(rectification),
-      boundary_(boundary_triangles(mesh)),
       tissue_(tissue),
       options_(options),
       colours_(colour_table(options.colour_map)),
@@ -158,7 +157,7 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
     const cv::Point2d px = project_to_recorded_left(rectification_.rig, nodes[i]);
     vertices_[i] = {px, static_cast<float>(1 / nodes[i].z())};
   }
-  rasterize(vertices_, boundary_, image.size(), visible_);
+  rasterize(vertices_, estimate.boundary, image.size(), visible_);
 
   const std::array<Tint, 256> tints = tints_of(colours_, options_.opacity);
   const double per_kPa = 255 / stress_scale_kPa_;
@@ -170,7 +169,7 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
       cv::Vec3b* pixel = image.ptr<cv::Vec3b>(area.y + row) + area.x;
       for (int column = 0; column < area.width; ++column) {
         if (triangle[column] < 0) continue;
-        const Triangle& corners = boundary_[static_cast<size_t>(triangle[column])];
+        const Triangle& corners = estimate.boundary[static_cast<size_t>(triangle[column])];
         const double w0 = weights[column][0], w1 = weights[column][1], w2 = 1 - w0 - w1;
         const auto blend = [&](const auto& values) {
           return w0 * values[static_cast<size_t>(corners[0])] + w1 * values[static_cast<size_t>(corners[1])] +
@@ -214,23 +213,29 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
     return;
   }
 
-  // As long in the image as it would be in space: an arrow along the line of sight is a point.
+  // As long in the image as it would be in space; along the line of sight a cross (away) or a dot (towards the camera).
   const double length_px = (25 + 65 * force_N / force_scale_N_) * scale;
   const double length_mm = length_px * estimate.tip_mm.z() / rectification_.focal_px;
   const Vec3 head_mm = estimate.tip_mm + estimate.force_N / force_N * length_mm;
-  const cv::Point2d head = head_mm.z() < 1 ? tip : project_to_recorded_left(rectification_.rig, head_mm);
-  const double seen_px = cv::norm(head - tip);
-  cv::circle(image, tip, px(5), dark, px(3), cv::LINE_AA);
-  cv::circle(image, tip, px(5), colour, px(1.5), cv::LINE_AA);
-  if (seen_px > 6 * scale) {
-    const double tip_share = std::min(0.4, 12 * scale / seen_px);
-    cv::arrowedLine(image, tip, head, dark, px(5.5), cv::LINE_AA, 0, tip_share);
-    cv::arrowedLine(image, tip, head, colour, px(2.5), cv::LINE_AA, 0, tip_share);
+  cv::Point2d head = head_mm.z() < 1 ? tip : project_to_recorded_left(rectification_.rig, head_mm);
+  const bool along_sight = cv::norm(head - tip) < 10 * scale;
+  if (along_sight) head = tip;
+  for (const auto& [ink, extra] : {std::pair(dark, 3 * scale), std::pair(colour, 0.0)}) {
+    cv::circle(image, tip, px(along_sight ? 9 : 5), ink, cvRound(1.5 * scale + extra), cv::LINE_AA);
+    const int width = cvRound(2.5 * scale + extra);
+    if (!along_sight) {
+      cv::arrowedLine(image, tip, head, ink, width, cv::LINE_AA, 0, std::min(0.4, 12 * scale / cv::norm(head - tip)));
+    } else if (estimate.force_N.z() > 0) {
+      cv::drawMarker(image, tip, ink, cv::MARKER_TILTED_CROSS, px(9), width, cv::LINE_AA);
+    } else {
+      cv::circle(image, tip, cvRound(2.5 * scale + extra / 2), ink, cv::FILLED, cv::LINE_AA);
+    }
   }
+
   const double text_px = 14 * scale;
   const std::string text = three_digits(force_N) + (estimate.status == FrameStatus::map_stale ? " N ?" : " N");
-  const cv::Point2d away = seen_px > 1 ? (head - tip) * (1 / seen_px) : cv::Point2d(0, -1);
-  const cv::Point centre(head + away * (text_px + 8 * scale));
+  const cv::Point2d away = along_sight ? cv::Point2d(0, -1) : (head - tip) * (1 / cv::norm(head - tip));
+  const cv::Point centre(head + away * (text_px + (along_sight ? 16 : 8) * scale));
   const int half = text_width(text, text_px, true) / 2 + px(4);
   const cv::Rect inside(half, px(24), std::max(0, image.cols - 2 * half), std::max(0, image.rows - px(60)));
   draw_rimmed_text(image, text, clamped(centre + cv::Point(0, cvRound(text_px / 2)), inside), text_px, colour,

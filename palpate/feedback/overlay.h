@@ -30,8 +30,7 @@ void describe(Settings& settings, OverlayOptions& options);
 /// scales and the history of the force.
 class OverlayPainter {
  public:
-  OverlayPainter(const Rectification& rectification, const TetMesh& mesh, const TissueOptions& tissue,
-                 const OverlayOptions& options = {});
+  OverlayPainter(const Rectification& rectification, const TissueOptions& tissue, const OverlayOptions& options = {});
 
   /// I_f: the left image as recorded (8-bit BGR) with stress on the tissue, the force at the tip and the readings.
   /// Frames in order of time. Throws std::invalid_argument when the image is not of the rig's size.
@@ -47,7 +46,6 @@ class OverlayPainter {
   cv::Scalar force_colour(const ForceEstimate& estimate) const;
 
   Rectification rectification_;
-  std::vector<Triangle> boundary_;
   TissueOptions tissue_;
   OverlayOptions options_;
   ColourTable colours_;

@@ -27,7 +27,7 @@ struct Interval {
 /// Not empty and not a point.
 Interval widened(const Interval& interval) {
   if (interval.empty()) return {0, 1};
-  return {interval.least, std::max(interval.most, interval.least + 1e-3)};
+  return {interval.least, interval.most - interval.least > 1e-9 ? interval.most : interval.least + 1};
 }
 
 /// From time and value to the SVG's own pixels.
