@@ -93,13 +93,6 @@ void check_region(const Presence& present, AttachmentRegion& region) {
     throw BadInput("oriented_box: the rows of axes are not three unit vectors at right angles");
 }
 
-/// Nine numbers as three rows.
-template <class Group>
-void bind_axes(Group& group, Mat3& axes) {
-  if constexpr (requires { group.matrix3("", axes, ""); })
-    group.matrix3("axes", axes, "rows = the box's unit axes in the left camera frame");
-}
-
 void describe_region(Settings& item, AttachmentRegion& region) {
   const auto present = std::make_shared<Presence>(region.kind);
   const Range positive{0, 1000, true};
@@ -122,7 +115,7 @@ void describe_region(Settings& item, AttachmentRegion& region) {
       [&region, positive, anywhere](Settings& group) {
         group.vector3("center_mm", region.center_mm, anywhere, "middle");
         group.vector3("half_size_mm", region.half_size_mm, positive, "half edge lengths along the box's axes");
-        bind_axes(group, region.axes);
+        group.matrix3("axes", region.axes, "rows = the box's unit axes in the left camera frame");
         group.require("center_mm");
         group.require("half_size_mm");
       },

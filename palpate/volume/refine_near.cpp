@@ -32,12 +32,10 @@ class Bisection {
     for (size_t t = 0; t < waiting.size(); ++t) waiting[t] = static_cast<int>(waiting.size() - 1 - t);
     while (!waiting.empty()) {
       const int t = waiting.back();
-      const Edge edge = longest_edge_of(t);
-      if (edge.squared_length <= longest_edge * longest_edge || distance(t, center) > radius) {
+      if (is_too_coarse(t, center, radius, longest_edge))
+        split_longest_first(longest_edge_of(t), waiting);
+      else
         waiting.pop_back();
-        continue;
-      }
-      split_longest_first(edge, waiting);
     }
   }
 
@@ -59,15 +57,18 @@ class Bisection {
     return longest;
   }
 
-  double distance(int t, const Vec3& center) {
+  /// Whether an edge of the tetrahedron that comes within the sphere is longer than wanted.
+  bool is_too_coarse(int t, const Vec3& center, double radius, double longest_edge) {
     const Tetrahedron& n = tetrahedron(t);
-    const Vec3 &a = point(n[0]), &b = point(n[1]), &c = point(n[2]), &d = point(n[3]);
-    if (signed_volume_mm3(center, b, c, d) >= 0 && signed_volume_mm3(a, center, c, d) >= 0 &&
-        signed_volume_mm3(a, b, center, d) >= 0 && signed_volume_mm3(a, b, c, center) >= 0)
-      return 0;
-    return std::min(
-        {closest_point_on_triangle(center, b, c, d).distance, closest_point_on_triangle(center, a, c, d).distance,
-         closest_point_on_triangle(center, a, b, d).distance, closest_point_on_triangle(center, a, b, c).distance});
+    for (size_t i = 0; i < 4; ++i)
+      for (size_t j = i + 1; j < 4; ++j) {
+        const Vec3 &a = point(n[i]), along = point(n[j]) - a;
+        const double squared = along.squaredNorm();
+        if (squared <= longest_edge * longest_edge) continue;
+        const double at = std::clamp((center - a).dot(along) / squared, 0.0, 1.0);
+        if ((a + at * along - center).squaredNorm() <= radius * radius) return true;
+      }
+    return false;
   }
 
   std::vector<int> around(const Edge& edge) {
