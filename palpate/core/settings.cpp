@@ -216,6 +216,29 @@ void Settings::vector3(const std::string& key, Eigen::Vector3d& field, Range ran
   entries_.push_back(std::move(entry));
 }
 
+void Settings::matrix3(const std::string& key, Eigen::Matrix3d& field, const std::string& doc) {
+  auto entry = std::make_unique<Entry>();
+  entry->key = key;
+  entry->doc = doc;
+  entry->range = "[[..], [..], [..]]";
+  entry->read = [&field](const YAML::Node& node, const SettingsContext&, const std::string& place, const std::string&) {
+    if (!node.IsSequence() || node.size() != 3)
+      throw BadInput(fmt::format("{} is {}, expected three rows of three numbers", place, written(node)));
+    for (int row = 0; row < 3; ++row) {
+      const std::vector<double> values = numbers_of(node[static_cast<size_t>(row)], 3, place, {});
+      field.row(row) << values[0], values[1], values[2];
+    }
+  };
+  entry->write = [&field] {
+    std::vector<std::string> rows;
+    for (int row = 0; row < 3; ++row)
+      rows.push_back(flow(std::vector<double>{field(row, 0), field(row, 1), field(row, 2)}));
+    return fmt::format("[{}]", fmt::join(rows, ", "));
+  };
+  entry->default_text = entry->write();
+  entries_.push_back(std::move(entry));
+}
+
 void Settings::pixel(const std::string& key, cv::Point2d& field, const std::string& doc) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;

@@ -54,6 +54,8 @@ class Settings {
   /// A file or folder: ${NAME} is replaced from the environment, relative paths start at the settings file.
   void path(const std::string& key, std::filesystem::path& field, const std::string& doc);
   void vector3(const std::string& key, Eigen::Vector3d& field, Range range, const std::string& doc);
+  /// [[..], [..], [..]], row by row.
+  void matrix3(const std::string& key, Eigen::Matrix3d& field, const std::string& doc);
   void pixel(const std::string& key, cv::Point2d& field, const std::string& doc);
   /// [[x, y], ...], at least three corners.
   void polygon(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc);
