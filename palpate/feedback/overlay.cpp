@@ -221,12 +221,12 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   const bool along_sight = cv::norm(head - tip) < 10 * scale;
   if (along_sight) head = tip;
   for (const auto& [ink, extra] : {std::pair(dark, 3 * scale), std::pair(colour, 0.0)}) {
-    cv::circle(image, tip, px(along_sight ? 9 : 5), ink, cvRound(1.5 * scale + extra), cv::LINE_AA);
+    cv::circle(image, tip, px(along_sight ? 11 : 5), ink, cvRound(1.5 * scale + extra), cv::LINE_AA);
     const int width = cvRound(2.5 * scale + extra);
     if (!along_sight) {
       cv::arrowedLine(image, tip, head, ink, width, cv::LINE_AA, 0, std::min(0.4, 12 * scale / cv::norm(head - tip)));
     } else if (estimate.force_N.z() > 0) {
-      cv::drawMarker(image, tip, ink, cv::MARKER_TILTED_CROSS, px(9), width, cv::LINE_AA);
+      cv::drawMarker(image, tip, ink, cv::MARKER_TILTED_CROSS, px(10), width, cv::LINE_AA);
     } else {
       cv::circle(image, tip, cvRound(2.5 * scale + extra / 2), ink, cv::FILLED, cv::LINE_AA);
     }
@@ -235,7 +235,7 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   const double text_px = 14 * scale;
   const std::string text = three_digits(force_N) + (estimate.status == FrameStatus::map_stale ? " N ?" : " N");
   const cv::Point2d away = along_sight ? cv::Point2d(0, -1) : (head - tip) * (1 / cv::norm(head - tip));
-  const cv::Point centre(head + away * (text_px + (along_sight ? 16 : 8) * scale));
+  const cv::Point centre(head + away * (text_px + (along_sight ? 18 : 8) * scale));
   const int half = text_width(text, text_px, true) / 2 + px(4);
   const cv::Rect inside(half, px(24), std::max(0, image.cols - 2 * half), std::max(0, image.rows - px(60)));
   draw_rimmed_text(image, text, clamped(centre + cv::Point(0, cvRound(text_px / 2)), inside), text_px, colour,
