@@ -218,7 +218,7 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   const double length_mm = length_px * estimate.tip_mm.z() / rectification_.focal_px;
   const Vec3 head_mm = estimate.tip_mm + estimate.force_N / force_N * length_mm;
   cv::Point2d head = head_mm.z() < 1 ? tip : project_to_recorded_left(rectification_.rig, head_mm);
-  const bool along_sight = cv::norm(head - tip) < 10 * scale;
+  const bool along_sight = cv::norm(head - tip) < 16 * scale;
   if (along_sight) head = tip;
   for (const auto& [ink, extra] : {std::pair(dark, 3 * scale), std::pair(colour, 0.0)}) {
     cv::circle(image, tip, px(along_sight ? 11 : 5), ink, cvRound(1.5 * scale + extra), cv::LINE_AA);
