@@ -1,0 +1,135 @@
+#include "palpate/core/settings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cstdlib>
+
+#include "palpate/core/errors.h"
+
+namespace palpate {
+namespace {
+
+enum class Fruit { apple, pear };
+
+struct Options {
+  double thickness_mm = 25;
+  int elements = 1344;
+  Fruit fruit = Fruit::apple;
+  Eigen::Vector3d center_mm = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  std::filesystem::path file;
+  std::vector<cv::Point2d> region;
+  std::vector<double> radii;
+};
+
+void describe(Settings& settings, Options& options) {
+  settings.number("thickness_mm", options.thickness_mm, {0, 500, true, false}, "depth");
+  settings.integer("elements", options.elements, {100, 1e6}, "count");
+  settings.choice<Fruit>("fruit", options.fruit, {{"apple", Fruit::apple}, {"pear", Fruit::pear}}, "kind");
+  settings.vector3("center_mm", options.center_mm, {}, "middle");
+  settings.matrix3("axes", options.axes, "rows");
+  settings.path("file", options.file, "a file");
+  settings.polygon("region_px", options.region, "outline");
+  settings.list(
+      "spheres", "several", [&options] { return static_cast<int>(options.radii.size()); },
+      [&options](int count) { options.radii.assign(static_cast<size_t>(count), 0); },
+      [&options](Settings& item, int i) {
+        item.number("radius_mm", options.radii[static_cast<size_t>(i)], {0, 9}, "radius");
+      });
+}
+
+Options read(const std::string& yaml) {
+  Options options;
+  Settings settings;
+  describe(settings, options);
+  read_settings(YAML::Load(yaml), {"folder/scene.yaml", "folder"}, settings);
+  return options;
+}
+
+std::string complaint(const std::string& yaml) {
+  try {
+    read(yaml);
+  } catch (const BadInput& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+TEST(Settings, ReadsEveryKindOfValue) {
+  const Options options = read(
+      "thickness_mm: 36\nelements: 550\nfruit: pear\ncenter_mm: [1, 2.5, -3]\naxes: [[0, 1, 0], [1, 0, 0], [0, 0, "
+      "1]]\nfile: a/b.mp4\nregion_px: [[0, 1], [2, 3], [4, 5.5]]\nspheres: [{radius_mm: 2}, {radius_mm: 3}]\n");
+  EXPECT_EQ(options.thickness_mm, 36);
+  EXPECT_EQ(options.elements, 550);
+  EXPECT_EQ(options.fruit, Fruit::pear);
+  EXPECT_EQ(options.center_mm, Eigen::Vector3d(1, 2.5, -3));
+  EXPECT_EQ(options.axes(0, 1), 1);
+  EXPECT_EQ(options.file, std::filesystem::path("folder/a/b.mp4"));
+  EXPECT_EQ(options.region.back(), cv::Point2d(4, 5.5));
+  EXPECT_EQ(options.radii, (std::vector<double>{2, 3}));
+}
+
+TEST(Settings, WhatIsWrittenReadsBackAsTheSame) {
+  Options options = read("thickness_mm: 0.1\nspheres: [{radius_mm: 2}]\nregion_px: [[0, 1], [2, 3], [4, 5.5]]\n");
+  options.axes.row(0) << 0.6, 0.8, 0;
+  Settings settings;
+  describe(settings, options);
+  const Options again = read(write_settings(settings));
+  EXPECT_EQ(again.thickness_mm, options.thickness_mm);
+  EXPECT_EQ(again.axes, options.axes);
+  EXPECT_EQ(again.radii, options.radii);
+  EXPECT_EQ(again.region, options.region);
+}
+
+TEST(Settings, AMisspeltKeyIsNamedWithItsLineAndTheNearestValidOne) {
+  EXPECT_EQ(complaint("elements: 200\nthicknes_mm: 20\n"),
+            "scene.yaml:2: thicknes_mm is not a known key; did you mean 'thickness_mm'?");
+}
+
+TEST(Settings, AValueOutOfRangeIsNamedWithWhatWasExpected) {
+  EXPECT_EQ(complaint("thickness_mm: 0\n"), "scene.yaml:1: thickness_mm is 0, expected 0 < x <= 500");
+  EXPECT_EQ(complaint("elements: 550.5\n"), "scene.yaml:1: elements is 550.5, expected a whole number");
+  EXPECT_EQ(complaint("spheres: [{radius_mm: 2}, {radius_mm: 10}]\n"),
+            "scene.yaml:1: spheres[1].radius_mm is 10, expected 0 <= x <= 9");
+}
+
+TEST(Settings, AValueOfTheWrongKindIsNamed) {
+  EXPECT_EQ(complaint("thickness_mm: thick\n"),
+            "scene.yaml:1: thickness_mm is 'thick', expected a number 0 < x <= 500");
+  EXPECT_EQ(complaint("thickness_mm: .nan\n"), "scene.yaml:1: thickness_mm is '.nan', expected a number 0 < x <= 500");
+  EXPECT_EQ(complaint("fruit: paer\n"),
+            "scene.yaml:1: fruit is 'paer', expected one of: apple, pear; did you mean 'pear'?");
+  EXPECT_EQ(complaint("center_mm: [1, 2]\n"), "scene.yaml:1: center_mm is a list, expected a list of 3 numbers");
+  EXPECT_EQ(complaint("region_px: [[1, 2], [3, 4]]\n"),
+            "scene.yaml:1: region_px is a list, expected at least three corners [[x, y], ...]");
+}
+
+TEST(Settings, AKeyThatStandsTwiceIsAnError) {
+  EXPECT_EQ(complaint("elements: 200\nelements: 300\n"), "scene.yaml:2: elements stands there twice, expected once");
+}
+
+TEST(Settings, PathsTakeTheEnvironmentAndSayWhichVariableIsMissing) {
+  setenv("PALPATE_TEST_FOLDER", "/somewhere", 1);
+  unsetenv("PALPATE_TEST_UNSET");
+  EXPECT_EQ(read("file: ${PALPATE_TEST_FOLDER}/x.mp4\n").file, std::filesystem::path("/somewhere/x.mp4"));
+  EXPECT_THAT(complaint("file: ${PALPATE_TEST_UNSET}/x.mp4\n"), testing::HasSubstr("PALPATE_TEST_UNSET is not set"));
+}
+
+TEST(Settings, DevicesAndPipelinesAreNoFiles) {
+  EXPECT_EQ(read("file: 0\n").file, std::filesystem::path("0"));
+  EXPECT_EQ(read("file: 'videotestsrc ! appsink'\n").file, std::filesystem::path("videotestsrc ! appsink"));
+}
+
+TEST(Settings, EveryKeyIsDocumentedWithItsDefault) {
+  Options options;
+  Settings settings;
+  describe(settings, options);
+  const std::string page = document_settings(settings);
+  EXPECT_THAT(page, testing::HasSubstr("| `thickness_mm` | `25` | 0 < x <= 500 | depth |"));
+  EXPECT_THAT(page, testing::HasSubstr("| `spheres[].radius_mm` | `0` | 0 <= x <= 9 | radius |"));
+}
+
+}  // namespace
+}  // namespace palpate
