@@ -10,7 +10,9 @@ namespace {
 
 constexpr int kSaturated = 235;  // a highlight is bright in every channel
 constexpr int kBlack = 14;       // the border of the scope, and nothing lit
-constexpr int kHalo_px = 5;      // highlights shine into their neighbourhood
+constexpr int kOutshine = 100;   // grey levels above the surroundings
+constexpr int kSurroundings_px = 61;
+constexpr int kHalo_px = 5;  // highlights shine into their neighbourhood
 
 // Black that touches the rim of the image.
 cv::Mat black_border(const cv::Mat& bgr) {
@@ -33,7 +35,10 @@ cv::Mat matchable_mask(const cv::Mat& bgr) {
   cv::Mat darkest;
   cv::min(channels[0], channels[1], darkest);
   cv::min(darkest, channels[2], darkest);
-  cv::Mat blocked = darkest >= kSaturated;
+  // Soft reflections do not saturate, but outshine their surroundings in every channel.
+  cv::Mat surroundings;
+  cv::blur(darkest, surroundings, {kSurroundings_px, kSurroundings_px});
+  cv::Mat blocked = (darkest >= kSaturated) | ((darkest - kOutshine) > surroundings);
   const cv::Mat halo = cv::getStructuringElement(cv::MORPH_ELLIPSE, {kHalo_px, kHalo_px});
   cv::dilate(blocked, blocked, halo);
   cv::Mat border = black_border(bgr);

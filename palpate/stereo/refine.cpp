@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 namespace palpate {
 namespace {
@@ -19,6 +20,8 @@ constexpr float kDeviationFloor_px = 0.02f;
 // Neighbouring residuals are alike (video compression, reflections), which smoothing over cells about makes up for.
 constexpr float kNoiseSpread = 1.1f;
 constexpr float kSameSurface_px = 0.7f;
+constexpr float kLeastAgreement = 0.3f;   // of the neighbours, by weight
+constexpr float kLeastNeighbours = 4.0f;  // by weight
 
 using RefineWindow = Window<16>;
 
@@ -80,20 +83,26 @@ std::vector<Neighbour> neighbourhood() {
   return all;
 }
 
-// Quadratic through the neighbours on the same surface, as a change of the cell's own plane.
-Vector6 fit_quadratic(const CellGrid& grid, const std::vector<Cell>& cells, const std::vector<Neighbour>& around,
-                      int column, int row) {
+// Quadratic through the neighbours on the same surface, as a change of the cell's own plane; nothing where too few
+// of the neighbours stand on it.
+std::optional<Vector6> fit_quadratic(const CellGrid& grid, const std::vector<Cell>& cells,
+                                     const std::vector<Neighbour>& around, int column, int row) {
   const DisparityPlane plane = cells[static_cast<size_t>(row * grid.columns + column)].plane;
   float products[24] = {}, sums[8] = {};
+  float agreeing = 0, all = 0;
   for (const Neighbour& n : around) {
     if (!grid.holds(column + n.column, row + n.row)) continue;
     const Cell& other = cells[static_cast<size_t>((row + n.row) * grid.columns + column + n.column)];
     const float off = other.plane.d - plane.at(n.u, n.v);
-    if (!other.matched || std::abs(off) > kSameSurface_px) continue;
+    if (!other.matched) continue;
+    all += n.falloff;
+    if (std::abs(off) > kSameSurface_px + 1 / std::sqrt(other.information)) continue;
+    agreeing += n.falloff;
     const float weight = other.information * n.falloff, weighted_off = weight * off;
     for (int k = 0; k < 24; ++k) products[k] += weight * n.products[k];
     for (int k = 0; k < 8; ++k) sums[k] += weighted_off * n.basis[k];
   }
+  if (agreeing < kLeastAgreement * all || agreeing < kLeastNeighbours) return std::nullopt;
   Eigen::Matrix<float, 6, 6> A = Eigen::Matrix<float, 6, 6>::Zero();
   for (int k = 0, at = 0; k < 6; ++k)
     for (int m = 0; m <= k; ++m) A(k, m) = products[at++];
@@ -113,10 +122,12 @@ void smooth_cells(CellGrid& grid) {
     for (int column = 0; column < grid.columns; ++column) {
       Cell& cell = grid.at(column, row);
       if (!cell.matched) continue;
-      const Vector6 change = fit_quadratic(grid, before, around, column, row);
-      cell.plane.d += change[0] - 0.5f * moment * (change[3] + change[5]);
-      cell.plane.dx += change[1];
-      cell.plane.dy += change[2];
+      const std::optional<Vector6> change = fit_quadratic(grid, before, around, column, row);
+      cell.matched = change.has_value();
+      if (!change) continue;
+      cell.plane.d += (*change)[0] - 0.5f * moment * ((*change)[3] + (*change)[5]);
+      cell.plane.dx += (*change)[1];
+      cell.plane.dy += (*change)[2];
     }
   });
 }
@@ -244,6 +255,7 @@ DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
 namespace {
 
 constexpr int kMeasureRadius = 5;
+constexpr float kOtherNoiseSpread = 2.5f;  // of OpenCV's matchers against the rendered organs
 
 cv::Mat warped_right(const Eyes& eyes, const cv::Mat& disparity, cv::Mat& weight) {
   cv::Mat map_x(disparity.size(), CV_32F), map_y(disparity.size(), CV_32F), right;
@@ -294,7 +306,8 @@ DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px) {
       const float residual = std::max(1e-3f, 2 * a * (1 - correlation));
       map.disparity_px.at<float>(y, x) = disparity_px.at<float>(y, x);
       map.correlation.at<float>(y, x) = correlation;
-      map.deviation_px.at<float>(y, x) = deviation_of(c * pixels * w_mean.at<float>(y, x) / residual);
+      map.deviation_px.at<float>(y, x) =
+          deviation_of(c * pixels * w_mean.at<float>(y, x) / residual, kOtherNoiseSpread);
     }
   return map;
 }

@@ -96,8 +96,8 @@ class Window {
   using Lane = float[Lanes];
   static constexpr float kLeastShare = 0.3f;      // of the window's weight
   static constexpr float kLeastGradient = 0.02f;  // mean square of the gradient, grey levels per px
-  // A weak belief in the predicted slopes: a deviation of 0.1, against noise of one grey level.
-  static constexpr float kSlopeBelief = 1 / (0.1f * 0.1f);
+  // A weak belief in the predicted slopes: a deviation of 0.03, against noise of one grey level.
+  static constexpr float kSlopeBelief = 1 / (0.03f * 0.03f);
 
   static float total(const Lane& lane) {
     float sum = 0;
