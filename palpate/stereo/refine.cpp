@@ -25,8 +25,8 @@ constexpr float kLeastNeighbours = 4.0f;  // by weight
 
 using RefineWindow = Window<16>;
 
-float deviation_of(float information) {
-  return std::hypot(kDeviationFloor_px, kNoiseSpread / std::sqrt(information));
+float deviation_of(float information, float spread = kNoiseSpread) {
+  return std::hypot(kDeviationFloor_px, spread / std::sqrt(information));
 }
 
 }  // namespace
