@@ -32,17 +32,23 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Pixels of the box that lie within two of the end of the picture.
-cv::Mat picture_border(const cv::Size& size, const cv::Rect& box, const cv::Mat& picture_area) {
-  cv::Mat inside = cv::Mat::zeros(box.size(), CV_8U);
+/// Pixels of the box that lie within two of the border of the image.
+cv::Mat image_border(const cv::Size& size, const cv::Rect& box) {
+  cv::Mat border(box.size(), CV_8U, cv::Scalar(255));
   const cv::Rect middle = (cv::Rect(2, 2, size.width - 4, size.height - 4) & box) - box.tl();
-  if (middle.area() > 0) inside(middle) = 255;
-  if (!picture_area.empty()) {
-    cv::Mat eroded;  // an ROI is eroded with the pixels around it
-    cv::erode(picture_area(box), eroded, cv::Mat::ones(5, 5, CV_8U));
-    inside &= eroded;
-  }
-  return inside == 0;
+  if (middle.area() > 0) border(middle) = 0;
+  return border;
+}
+
+/// The same for the border of the picture where it does not fill the image.
+cv::Mat picture_border(const cv::Mat& picture_area, const cv::Rect& box) {
+  cv::Mat eroded;  // a part of an image is eroded with the pixels around it
+  cv::erode(picture_area(box), eroded, cv::Mat::ones(5, 5, CV_8U));
+  return eroded == 0;
+}
+
+bool touches(const std::vector<cv::Point>& pixels, const cv::Mat& border) {
+  return std::any_of(pixels.begin(), pixels.end(), [&](const cv::Point& p) { return border.at<uchar>(p) != 0; });
 }
 
 std::vector<Slice> slices_along(const std::vector<cv::Point>& pixels, const cv::Mat& border, const cv::Point2d& origin,
@@ -201,7 +207,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
   const cv::Rect box = cv::boundingRect(instrument_mask);
   if (box.area() < kLeastPixels) return {};
-  const cv::Mat border = picture_border(instrument_mask.size(), box, picture_area);
+  const cv::Mat border = image_border(instrument_mask.size(), box);
   cv::Mat labels, stats, centres;
   const int count = cv::connectedComponentsWithStats(instrument_mask(box), labels, stats, centres, 8);
   std::vector<int> by_size;
@@ -212,7 +218,8 @@ std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& 
   for (int label : by_size) {
     std::vector<cv::Point> pixels;
     cv::findNonZero(labels == label, pixels);
-    if (auto tip = tip_of_component(pixels, border)) {
+    const bool from_image_border = touches(pixels, border) || picture_area.empty();
+    if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box))) {
       tip->tip_px += cv::Point2d(box.tl());
       return tip;
     }

@@ -46,7 +46,7 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
   return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
 }
 
-/// Redness that four fifths of the tissue exceed, and its usual brightness.
+/// Redness that four fifths of the tissue exceed, and the brightness below which colour is noise.
 void learn_tissue(const cv::Mat& half_bgr, const cv::Mat& half_organ, const cv::Mat& instrument,
                   SegmentationModel& model) {
   std::vector<float> redness, value;
@@ -61,7 +61,7 @@ void learn_tissue(const cv::Mat& half_bgr, const cv::Mat& half_organ, const cv::
     }
   if (value.size() < 100) return;
   model.tissue_redness = std::clamp(percentile(redness, 0.2), 0.2, 0.5);
-  model.least_value = std::clamp(0.2 * percentile(value, 0.5), 10.0, 30.0);
+  model.least_value = std::clamp(0.2 * percentile(value, 0.9), 14.0, 32.0);
 }
 
 /// Grey pixels at half size, without the still grey ones of the static frame.

@@ -20,7 +20,9 @@ constexpr double kLeastAgreementAlone = 0.5;  // for a frame in which the mask g
 constexpr double kKeyframeReach_px = 40;      // motion after which a fresh keyframe is better
 constexpr int kMostFramesAlone = 5;           // without any tip from the masks
 constexpr int kMostRejected = 3;              // detections outside the gate before the filter starts anew
-constexpr double kTipDeviation_px = 0.7;      // where the mask ends against where the jaws end
+constexpr double kThinnest_mm = 0.8;          // shaft of an instrument
+constexpr double kThickest_mm = 25;
+constexpr double kTipDeviation_px = 0.7;  // where the mask ends against where the jaws end
 constexpr double kDisparityFloor_px = 0.05;
 constexpr double kBias_mm = 0.25;  // what does not average out over frames: outline, one side of the jaws seen
 constexpr double kMotionFloor_mm = 0.02;
@@ -70,6 +72,10 @@ std::optional<Detection> detect(const EyeView& left, const EyeView& right, const
   detection.left_template = make_template(left.layers, left.mask, *left.tip, followed_length_px(*left.tip));
   const auto plane = match_instrument(detection.left_template, left.tip->tip_px, right.layers, guess, r.focal_px);
   if (!plane) return {};
+  // Both masks end at the same tip: the match of the whole far part must not contradict them.
+  if (std::abs(plane->disparity[0] - guess) > 4 + 0.1 * left.tip->width_px) return {};
+  const double width_mm = left.tip->width_px * r.depth_mm(plane->disparity[0]) / r.focal_px;
+  if (width_mm < kThinnest_mm || width_mm > kThickest_mm) return {};
   detection.plane = *plane;
   detection.tip_mm = rectified_point(r, left.tip->tip_px, plane->disparity[0]);
   const double z = detection.tip_mm.z();
