@@ -105,8 +105,8 @@ TetMesh mesh_of(const Complex& complex) {
 Complex refine(const Domain& domain, const std::vector<Vec3>& start, double size_mm,
                const std::optional<MeshFocus>& focus) {
   namespace P = CGAL::parameters;
-  const SizeField cell_size{size_mm, focus}, facet_size{0.9 * size_mm, focus}, distance{0.12 * size_mm, focus};
-  const Criteria criteria(P::facet_angle = 25, P::facet_size = facet_size, P::facet_distance = distance,
+  const SizeField cell_size{size_mm, focus}, facet_size{0.9 * size_mm, focus}, distance{0.2 * size_mm, focus};
+  const Criteria criteria(P::facet_angle = 20, P::facet_size = facet_size, P::facet_distance = distance,
                           P::cell_radius_edge_ratio = 2, P::cell_size = cell_size);
   Complex complex;
   for (const Vec3& p : start) {

@@ -19,8 +19,10 @@ struct MeshReport {
   double cell_size_mm = 0;
 };
 
-/// V of the paper: the inside of a closed surface filled with CGAL's Delaunay refinement; the cell size is searched so
-/// that the count is within 10 % of `elements`. Every element has positive volume; the boundary follows the surface.
+/// V of the paper: the inside of a closed surface (where its winding number is positive, so it may overlap itself)
+/// filled with CGAL's Delaunay refinement; the cell size is searched so that the count is within 10 % of `elements`.
+/// Every element has positive volume and, but for bodies with knife edges, no dihedral angle below 10 degrees; the
+/// boundary fits the surface in the mean square, sharp rims are cut off; one piece without hinges. All labels are 0.
 /// The same input gives the same mesh. Throws BadInput when the body cannot be filled.
 TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::optional<MeshFocus>& focus = {},
                        MeshReport* report = nullptr);

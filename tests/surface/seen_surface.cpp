@@ -47,6 +47,26 @@ TrueSurface bumpy_organ() {
           }};
 }
 
+TrueSurface ball_before_wall() {
+  return {"ball before a wall", [](const Vec3& p) { return std::min((p - Vec3(0, 0, 85)).norm() - 18, 125 - p.z()); }};
+}
+
+namespace {
+
+/// Depth along a viewing ray (z = 1), 0 where nothing is hit.
+double depth_mm(const TrueSurface& surface, const Vec3& ray) {
+  double outside = 60, inside = 0;
+  for (double z = outside; z < 140 && inside == 0; z += 1) (surface.value(ray * z) < 0 ? inside : outside) = z;
+  if (inside == 0) return 0;
+  for (int i = 0; i < 30; ++i) {
+    const double z = (inside + outside) / 2;
+    (surface.value(ray * z) < 0 ? inside : outside) = z;
+  }
+  return (inside + outside) / 2;
+}
+
+}  // namespace
+
 PointCloud look_at(const TrueSurface& surface, const View& view) {
   std::mt19937 random(view.seed);
   std::normal_distribution<double> noise(0, 1);
@@ -54,20 +74,15 @@ PointCloud look_at(const TrueSurface& surface, const View& view) {
   PointCloud cloud;
   for (int v = -view.half_height_px; v <= view.half_height_px; v += view.step_px) {
     for (int u = -view.half_width_px; u <= view.half_width_px; u += view.step_px) {
-      const Vec3 ray(u / view.focal_px, v / view.focal_px, 1);
-      double outside = 60, inside = 0;
-      for (double z = outside; z < 140 && inside == 0; z += 1) {
-        if (surface.value(ray * z) < 0)
-          inside = z;
-        else
-          outside = z;
+      const auto ray_at = [&](double du) { return Vec3((u + du) / view.focal_px, v / view.focal_px, 1); };
+      const Vec3 ray = ray_at(0);
+      double truth = depth_mm(surface, ray);
+      if (truth == 0) continue;
+      if (view.ramp_px > 0) {
+        const double left = depth_mm(surface, ray_at(-0.5 * view.ramp_px)),
+                     right = depth_mm(surface, ray_at(0.5 * view.ramp_px));
+        if (left > 0 && right > 0 && std::abs(left - right) > 5) truth = left + (right - left) * uniform(random);
       }
-      if (inside == 0) continue;
-      for (int i = 0; i < 40; ++i) {
-        const double z = (inside + outside) / 2;
-        (surface.value(ray * z) < 0 ? inside : outside) = z;
-      }
-      const double truth = (inside + outside) / 2;
       if ((ray * truth - view.hole_center_mm).norm() < view.hole_radius_mm) continue;
       double z = truth + view.noise_mm * noise(random);
       if (uniform(random) < view.outlier_share) z = truth + 40 * (uniform(random) - 0.5);

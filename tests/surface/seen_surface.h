@@ -23,6 +23,8 @@ TrueSurface saddle();       ///< z = 100 + (x^2 - y^2) / 80
 TrueSurface torus_patch();  ///< radii 30 and 12 mm, lying before the camera
 TrueSurface bumpy_organ();  ///< ellipsoid of 60 mm with waves of 14 mm length and 0.8 mm height
 
+TrueSurface ball_before_wall();  ///< radius 18 mm at 85 mm, wall at 125 mm
+
 struct View {
   double focal_px = 700;
   int half_width_px = 200;
@@ -32,6 +34,7 @@ struct View {
   double outlier_share = 0;  ///< uniform within 20 mm along the ray
   Vec3 hole_center_mm = Vec3::Zero();
   double hole_radius_mm = 0;  ///< points this near to `hole_center_mm` are missing
+  int ramp_px = 0;            ///< depth edges are smeared over so many pixels, as windows that straddle them do
   unsigned seed = 1;
 };
 
