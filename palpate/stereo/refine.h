@@ -1,9 +1,17 @@
 #pragma once
 
+#include <cmath>
+
 #include "palpate/stereo/grow.h"
 #include "palpate/stereo/match.h"
 
 namespace palpate {
+
+/// One standard deviation of a disparity of which a window says `information` (1/px^2): never below 0.02 px, and
+/// `noise_spread` times what independent noise would leave.
+inline float deviation_px(float information, float noise_spread) {
+  return std::hypot(0.02f, noise_spread / std::sqrt(information));
+}
 
 /// Fits every matched cell again at full size with larger windows (sub-pixel refinement).
 void refine_cells(const Eyes& eyes, CellGrid& grid);

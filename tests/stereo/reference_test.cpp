@@ -60,7 +60,7 @@ TEST_P(RenderedOrgan, IsMatchedFarBelowAPixel) {
 
   const Score got =
       score(match(pair, rectification, cv::Mat(recording.size(), CV_8U, cv::Scalar(255)), {}), truth, organ);
-  EXPECT_LT(got.mean_px, 0.11);
+  EXPECT_LT(got.mean_px, 0.10);
   EXPECT_LT(got.median_px, 0.045);
   EXPECT_LT(got.above_one_px, 0.008);
   EXPECT_GT(got.coverage, 0.97);
