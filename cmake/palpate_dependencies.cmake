@@ -4,7 +4,6 @@ find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio video cal
 find_package(TBB REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(CGAL REQUIRED)

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace palpate {
@@ -11,60 +12,64 @@ namespace {
 
 constexpr int kMostHalvings = 12;
 constexpr int kMostSubdivisions = 5;
-
-/// K + rho J^T J on one fixed pattern. The same solution as K with the constraint, but positive definite also where the
-/// tissue under the tip softens in compression.
-class AugmentedStiffness {
- public:
-  AugmentedStiffness(const TetModel& model, const Eigen::SparseMatrix<double>& J) {
-    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * model.node_count());
-    model.tangent(rest, false, K_);
-    rho_ = K_.diagonal().mean();
-    const Eigen::SparseMatrix<double> full = rho_ * (J.transpose() * J);
-    JtJ_ = full.triangularView<Eigen::Lower>();
-    augmented_ = K_ + JtJ_;
-    factor_.analyze(augmented_);
-  }
-
-  /// False when even the projected tangent cannot be factored.
-  bool factorize(const TetModel& model, const Eigen::VectorXd& u) {
-    for (bool project : {false, true}) {
-      model.tangent(u, project, K_);
-      augmented_ = K_ + JtJ_;
-      if (factor_.factorize(augmented_)) return true;
-    }
-    return false;
-  }
-
-  double rho() const { return rho_; }
-  const SparseFactor& factor() const { return factor_; }
-
- private:
-  Eigen::SparseMatrix<double> K_, JtJ_, augmented_;
-  SparseFactor factor_;
-  double rho_ = 0;
-};
+/// A step that leaves more than this share of the residual calls for a new factorisation.
+constexpr double kSlowShare = 0.4;
 
 struct NewtonStep {
   Eigen::VectorXd du;      // on the unknowns
   Eigen::VectorXd lambda;  // new multipliers
 };
 
-/// Eq. 3 by Schur complement on the factored stiffness A = K + rho J^T J:
+/// Eq. 3 by Schur complement on the factored stiffness A = K + rho J^T J, on one fixed pattern:
 ///   A du + J^T lambda = -f_int + rho J^T g,  J du = g.
-std::optional<NewtonStep> solve_bordered(const AugmentedStiffness& A, const Eigen::SparseMatrix<double>& J,
-                                         const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) {
-  const Eigen::MatrixXd Y = A.factor().solve(Eigen::MatrixXd(J.transpose()));
-  const Eigen::MatrixXd S = J * Y;
-  const Eigen::LDLT<Eigen::MatrixXd> schur(S);
-  if (schur.info() != Eigen::Success) return std::nullopt;
-  const Eigen::VectorXd a = A.factor().solve(Eigen::VectorXd(-f_int + A.rho() * (J.transpose() * g)));
-  NewtonStep step;
-  step.lambda = schur.solve(J * a - g);
-  step.du = a - Y * step.lambda;
-  if (!step.du.allFinite() || !step.lambda.allFinite()) return std::nullopt;
-  return step;
-}
+/// The same solution as with K, but A is positive definite also where the tissue under the tip softens in compression.
+class BorderedSystem {
+ public:
+  BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J) : J_(J) {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * model.node_count());
+    model.tangent(rest, false, K_);
+    rho_ = K_.diagonal().mean();
+    const Eigen::SparseMatrix<double> full = rho_ * (J.transpose() * J);
+    JtJ_ = full.triangularView<Eigen::Lower>();
+    A_ = K_ + JtJ_;
+    factor_.analyze(A_);
+  }
+
+  /// False when even the projected tangent cannot be factored.
+  bool factorize(const TetModel& model, const Eigen::VectorXd& u) {
+    usable_ = false;
+    for (bool project : {false, true}) {
+      model.tangent(u, project, K_);
+      A_ = K_ + JtJ_;
+      if (!factor_.factorize(A_)) continue;
+      Y_ = factor_.solve(Eigen::MatrixXd(J_.transpose()));
+      schur_.compute(J_ * Y_);
+      usable_ = schur_.info() == Eigen::Success;
+      return usable_;
+    }
+    return false;
+  }
+
+  bool usable() const { return usable_; }
+  double rho() const { return rho_; }
+
+  std::optional<NewtonStep> solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
+    const Eigen::VectorXd a = factor_.solve(Eigen::VectorXd(-f_int + rho_ * (J_.transpose() * g)));
+    NewtonStep step;
+    step.lambda = schur_.solve(J_ * a - g);
+    step.du = a - Y_ * step.lambda;
+    if (!step.du.allFinite() || !step.lambda.allFinite()) return std::nullopt;
+    return step;
+  }
+
+ private:
+  Eigen::SparseMatrix<double> J_, K_, JtJ_, A_;
+  SparseFactor factor_;
+  Eigen::MatrixXd Y_;  // A^-1 J^T
+  Eigen::LDLT<Eigen::MatrixXd> schur_;
+  double rho_ = 0;
+  bool usable_ = false;
+};
 
 double largest_nodal_norm(const Eigen::VectorXd& v) {
   double largest = 0;
@@ -79,7 +84,7 @@ struct EquilibriumSolver::State {
   EquilibriumOptions options;
   Footprint footprint;
   Eigen::SparseMatrix<double> J;
-  std::unique_ptr<AugmentedStiffness> stiffness;
+  std::unique_ptr<BorderedSystem> system;
   Eigen::VectorXd u;       // unknowns of the last equilibrium
   Eigen::VectorXd lambda;  // its multipliers
   Vec3 displacement_mm = Vec3::Zero();
@@ -99,12 +104,15 @@ struct EquilibriumSolver::State {
     const Eigen::VectorXd target = p.replicate(J.rows() / 3, 1);
     Eigen::VectorXd trial = u, multipliers = lambda;
     Reached reached;
+    // The factor of an earlier state serves as long as it makes the true residual fall quickly.
+    bool fresh = false, refactor = !system->usable();
+    double last_residual = std::numeric_limits<double>::infinity();
     for (;;) {
       const Eigen::VectorXd full = model.expand(trial);
       const Eigen::VectorXd f_int = model.reduce(model.internal_force(full));
       const Eigen::VectorXd g = target - J * trial;
       const Eigen::VectorXd contact = J.transpose() * multipliers;
-      const double scale = std::max(largest_nodal_norm(contact), 1e-9 * stiffness->rho());
+      const double scale = std::max(largest_nodal_norm(contact), 1e-9 * system->rho());
       reached.residual = largest_nodal_norm(f_int + contact) / scale;
       const bool constrained = g.size() == 0 || g.lpNorm<Eigen::Infinity>() < 1e-9;
       if (constrained && reached.residual <= options.relative_residual) {
@@ -114,16 +122,27 @@ struct EquilibriumSolver::State {
         displacement_mm = p;
         return reached;
       }
-      if (iterations_left == 0 || !stiffness->factorize(model, full)) return reached;
+      if (iterations_left == 0) return reached;
       --iterations_left;
-      const auto step = solve_bordered(*stiffness, J, f_int, g);
-      if (!step) return reached;
-      const auto length = step_length(trial, step->du, f_int, constrained);
-      if (!length) return reached;
+      if (constrained && reached.residual > kSlowShare * last_residual) refactor = true;
+      if (constrained) last_residual = reached.residual;
+      if (refactor) {
+        if (!system->factorize(model, full)) return reached;
+        fresh = true;
+        refactor = false;
+      } else {
+        fresh = false;
+      }
+      const auto step = system->solve(f_int, g);
+      const auto length = step ? step_length(trial, step->du, f_int, constrained) : std::nullopt;
+      if (!length) {
+        if (fresh) return reached;
+        refactor = true;
+        continue;
+      }
       trial += *length * step->du;
       multipliers += *length * (step->lambda - multipliers);
     }
-    return reached;
   }
 
   /// Full steps move the constraint; afterwards the energy has to fall (Armijo).
@@ -178,19 +197,19 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   State& s = *state_;
   s.footprint = footprint;
   s.J = constraint_matrix(s.model, footprint);
-  s.stiffness = std::make_unique<AugmentedStiffness>(s.model, s.J);
+  s.system = std::make_unique<BorderedSystem>(s.model, s.J);
   s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
   s.lambda = Eigen::VectorXd::Zero(s.J.rows());
   s.displacement_mm.setZero();
 }
 
 void EquilibriumSolver::release() {
-  state_->stiffness.reset();
+  state_->system.reset();
 }
 
 Equilibrium EquilibriumSolver::solve(const Vec3& displacement_mm) {
   State& s = *state_;
-  if (!s.stiffness) {
+  if (!s.system) {
     Equilibrium rest;
     rest.converged = true;
     rest.u = Eigen::VectorXd::Zero(3 * s.model.node_count());

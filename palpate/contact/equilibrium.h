@@ -8,7 +8,7 @@ namespace palpate {
 
 struct EquilibriumOptions {
   double relative_residual = 1e-6;  ///< of the largest nodal force
-  int most_iterations = 80;         ///< Newton steps of one call, all parts of the displacement together
+  int most_iterations = 60;         ///< Newton steps of one call, all parts of the displacement together
   double longest_step_mm = 2.0;     ///< prescribed displacement applied at once
 };
 
@@ -36,7 +36,8 @@ class EquilibriumSolver {
   /// Ends it.
   void release();
 
-  /// Newton on Eq. 3 from the last state: K u + J^T lambda = f, J u = p with the same p for every sample.
+  /// Newton on Eq. 3 from the last state, with a factor that is renewed only when it no longer serves: K u + J^T lambda
+  /// = f, J u = p with the same p for every sample.
   Equilibrium solve(const Vec3& displacement_mm);
 
  private:

@@ -20,7 +20,7 @@ namespace {
 constexpr int kMostLostFrames = 5;
 /// Elements around the footprint are split until their edges are this share of its radius.
 constexpr double kFootprintEdgeShare = 0.5;
-constexpr double kFootprintReach = 1.5;
+constexpr double kFootprintReach = 1.2;
 /// The ring of tissue watched around a contact, in footprint radii and at least so wide.
 constexpr double kWatchedRadii = 3.5;
 constexpr double kLeastWatched_mm = 8;
@@ -124,7 +124,9 @@ struct ForceEstimator::State {
     estimate.status = FrameStatus::not_converged;
     if (held->near_attachment()) estimate.warnings.push_back("near_attachment");
     if (equilibrium.smallest_volume_ratio < kLeastVolumeRatio) estimate.warnings.push_back("law_out_of_range");
-    if (!equilibrium.converged || equilibrium.smallest_volume_ratio <= 0) return;
+    // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
+    if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
+    if (!equilibrium.converged) return;
     estimate.status = estimate.misfit_mm > kStaleMisfit_mm ? FrameStatus::map_stale : FrameStatus::ok;
     estimate.force_N = equilibrium.force_N;
     estimate.mean_nodal_force_N = equilibrium.mean_nodal_force_N;
