@@ -15,9 +15,8 @@
 namespace palpate {
 namespace {
 
-const double kEdgesPerRadius = 4;  // of the mesh inside the patch
-const double kFocusRadii = 2.5;    // the mesh is finer within so many radii of the patch
-const double kFocusEdgeRatio = 0.45;
+const double kFocusRadii = 1.5;       // the mesh is finer within so many radii of the patch
+const double kFocusEdgeRatio = 0.25;  // of edges there to edges elsewhere
 
 const Vec3& at(const std::vector<Vec3>& values, int i) {
   return values[static_cast<size_t>(i)];
@@ -55,8 +54,7 @@ TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOp
                           const Vec3& contact_normal, double radius_mm) {
   TruthBody body;
   const MeshFocus focus{contact_mm, kFocusRadii * radius_mm, kFocusEdgeRatio};
-  body.mesh =
-      refine_near(tetrahedralize(organ, elements, focus), contact_mm, 1.2 * radius_mm, radius_mm / kEdgesPerRadius);
+  body.mesh = tetrahedralize(organ, elements, focus);
   body.boundary = boundary_triangles(body.mesh);
   body.fixed_nodes = select_attachments(body.mesh, attachments, project_px);
 

@@ -17,8 +17,8 @@ struct TruthBody {
   double patch_radius_mm = 0;  ///< of a disc with the area that the tied nodes move along
 };
 
-/// Fills the closed organ with about `elements` tetrahedra, finer around `contact_mm`, refined there until the patch of
-/// `radius_mm` is well sampled. `project_px` as in select_attachments. Throws BadInput when the body cannot be filled,
+/// Fills the closed organ with about `elements` tetrahedra, finer around `contact_mm`, so that the patch of `radius_mm`
+/// is well sampled. `project_px` as in select_attachments. Throws BadInput when the body cannot be filled,
 /// when attachments select nothing or everything, or when the patch lies on attached tissue.
 TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
                           const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
