@@ -1,10 +1,12 @@
 #include "palpate/instrument/tip_tracker.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
 
+#include "palpate/core/errors.h"
 #include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/rigid_motion.h"
 #include "palpate/instrument/segment.h"
@@ -201,9 +203,15 @@ void TipTracker::State::report_since_mark(TipObservation& observation) const {
 }
 
 void describe(Settings& settings, InstrumentOptions& options) {
-  settings.choice("segmentation", options.segmentation, {{"colour", InstrumentOptions::Segmentation::colour}},
-                  "how the instrument is found in the images");
+  settings.text("segmentation", options.segmentation, "how the instrument is found in the images: colour");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
+  settings.after_reading([&options] {
+    if (options.segmentation == "colour") return;
+    if (options.segmentation.ends_with(".onnx"))
+      throw BadInput(fmt::format("instrument.segmentation is '{}': networks are not there yet, expected colour",
+                                 options.segmentation));
+    throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour", options.segmentation));
+  });
 }
 
 TipTracker::TipTracker(const InstrumentOptions& options, const Rectification& rectification,

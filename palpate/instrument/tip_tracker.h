@@ -1,8 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
@@ -12,8 +14,8 @@ namespace palpate {
 
 /// `instrument` of the scene file.
 struct InstrumentOptions {
-  enum class Segmentation { colour } segmentation = Segmentation::colour;
-  std::filesystem::path track;  ///< tip.csv instead of the video
+  std::string segmentation = "colour";  ///< how the instrument is found in the images
+  std::filesystem::path track;          ///< tip.csv instead of the images
 };
 
 void describe(Settings& settings, InstrumentOptions& options);

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <fstream>
 
@@ -80,6 +81,21 @@ TEST_F(TipTrackFile, ReplacesTheImages) {
   EXPECT_FALSE(seen[2].since_mark_mm);
   ASSERT_TRUE(seen[4].since_mark_mm);
   EXPECT_NEAR((*seen[4].since_mark_mm - Vec3(0.8, 0, 1)).norm(), 0, 1e-12);
+}
+
+TEST(InstrumentOptions, SayThatNetworksAreNotThereYet) {
+  for (const char* word : {"tool.onnx", "colours"}) {
+    InstrumentOptions options;
+    options.segmentation = "colour";
+    Settings settings;
+    describe(settings, options);
+    try {
+      read_settings(YAML::Load(std::string("segmentation: ") + word), {}, settings, "instrument.");
+      ADD_FAILURE() << word << " was taken";
+    } catch (const BadInput& error) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+    }
+  }
 }
 
 }  // namespace
