@@ -80,7 +80,7 @@ EdgeLine fit_edge(const std::vector<double>& s, const std::vector<double>& t) {
   line.offset = median_of(t);
   for (int pass = 0; pass < 8; ++pass) {
     for (size_t i = 0; i < s.size(); ++i) residual[i] = std::abs(t[i] - line.offset - line.slope * s[i]);
-    line.deviation = 1.48 * median_of(residual);
+    if (pass % 3 == 0) line.deviation = 1.48 * median_of(residual);
     const double limit = 4.7 * std::max(line.deviation, 0.5);
     double w0 = 0, ws = 0, wss = 0, wt = 0, wst = 0;
     for (size_t i = 0; i < s.size(); ++i) {
@@ -175,8 +175,9 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   double farthest = 0;
   for (const cv::Point& p : pixels) {
     const cv::Point2d away = cv::Point2d(p) - entry;
-    if (const double distance = std::hypot(away.x, away.y); distance > farthest) farthest = distance, axis = away;
+    if (const double squared = away.dot(away); squared > farthest) farthest = squared, axis = away;
   }
+  farthest = std::sqrt(farthest);
   if (farthest < 8) return {};
   axis *= 1 / farthest;
 

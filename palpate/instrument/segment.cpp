@@ -1,6 +1,7 @@
 #include "palpate/instrument/segment.h"
 
 #include <algorithm>
+#include <array>
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/instrument/find_tip.h"
@@ -133,16 +134,20 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const SegmentationMode
 
 cv::Mat metalness(const cv::Mat& bgr, const SegmentationModel& model) {
   cv::Mat result(bgr.size(), CV_8U);
-  const float floor = static_cast<float>(model.least_value);
-  const float scale = static_cast<float>(255 / model.tissue_redness);
+  std::array<float, 256> full, per_redness;  // by brightness
+  for (int value = 0; value < 256; ++value) {
+    const double bright = std::clamp(2 * value / model.least_value - 1, 0.0, 1.0);
+    full[static_cast<size_t>(value)] = static_cast<float>(255 * bright);
+    per_redness[static_cast<size_t>(value)] =
+        static_cast<float>(255 * bright / (model.tissue_redness * std::max(value, 1)));
+  }
   for (int y = 0; y < bgr.rows; ++y) {
     const cv::Vec3b* from = bgr.ptr<cv::Vec3b>(y);
     uchar* to = result.ptr<uchar>(y);
     for (int x = 0; x < bgr.cols; ++x) {
-      const float value = static_cast<float>(value_of(from[x]));
-      const float bright = std::clamp(2 * value / floor - 1, 0.0f, 1.0f);
-      const float grey = 255 - scale * static_cast<float>(redness_of(from[x])) / std::max(value, 1.0f);
-      to[x] = static_cast<uchar>(bright * std::max(grey, 0.0f));
+      const size_t value = static_cast<size_t>(value_of(from[x]));
+      const float redness = static_cast<float>(redness_of(from[x]));
+      to[x] = static_cast<uchar>(std::max(0.0f, full[value] - per_redness[value] * redness));
     }
   }
   return result;
