@@ -1,0 +1,129 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "palpate/feedback/forces_file.h"
+#include "tests/app/program.h"
+#include "tests/support/reference_data.h"
+
+namespace palpate::test {
+namespace {
+
+using testing::HasSubstr;
+
+int frames_in(const std::filesystem::path& video) {
+  cv::VideoCapture capture(video.string());
+  int frames = 0;
+  for (cv::Mat image; capture.read(image);) ++frames;
+  return frames;
+}
+
+TEST(Program, WithoutAVerbItSaysWhatItCanDoAndEndsWithTwo) {
+  const Outcome outcome = run_palpate("");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.error, HasSubstr("estimate"));
+}
+
+TEST(Program, EveryVerbHasHelpWithAnExample) {
+  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check"}) {
+    const Outcome outcome = run_palpate(std::string(verb) + " --help");
+    EXPECT_EQ(outcome.exit_code, 0) << verb;
+    EXPECT_THAT(outcome.output, HasSubstr("Example: palpate")) << verb;
+  }
+}
+
+TEST(Program, VerbsThatAreNotThereYetSaySoAndEndWithTwo) {
+  for (const char* verb : {"study some.yaml", "console"}) {
+    const Outcome outcome = run_palpate(verb);
+    EXPECT_EQ(outcome.exit_code, 2) << verb;
+    EXPECT_THAT(outcome.error, HasSubstr("not there yet")) << verb;
+  }
+}
+
+TEST(Program, WrongUseEndsWithTwo) {
+  EXPECT_EQ(run_palpate("estimate").exit_code, 2);
+  EXPECT_EQ(run_palpate("estimate a.yaml --colour red").exit_code, 2);
+  EXPECT_EQ(run_palpate("fly").exit_code, 2);
+}
+
+TEST(Program, MapWritesEveryFileOfTheContract) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 2);
+  const Outcome outcome =
+      run_palpate("map " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  for (const char* name : {"map.vtu", "surface.ply", "cloud.ply", "preview.png", "map.json"})
+    EXPECT_TRUE(std::filesystem::exists(workspace / "out" / name)) << name;
+  EXPECT_TRUE(nlohmann::json::accept(outcome.output));
+  EXPECT_FALSE(cv::imread((workspace / "out/preview.png").string()).empty());
+}
+
+TEST(Program, AVideoWithoutInstrumentIsToolLostInEveryFrame) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 4);
+  const Outcome outcome = run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " +
+                                      (workspace / "out").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const std::vector<ForceRow> rows = read_forces(workspace / "out/forces.csv");
+  ASSERT_EQ(rows.size(), 4u);
+  for (const ForceRow& row : rows) {
+    EXPECT_EQ(row.status, "tool_lost");
+    EXPECT_EQ(row.force_magnitude_N, 0);
+  }
+  EXPECT_EQ(frames_in(workspace / "out/overlay.mp4"), 4);
+  EXPECT_THAT(read_file(workspace / "out/run.yaml"), HasSubstr("thickness_mm: 15"));
+}
+
+TEST(Program, SettingsInEffectReadBackAsAScene) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 2);
+  ASSERT_EQ(run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string())
+                .exit_code,
+            0);
+  const Outcome again = run_palpate("check " + (workspace / "out/run.yaml").string() + " --json");
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+}
+
+TEST(Program, ATruncatedVideoEndsWithFourAndKeepsWhatIsDone) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 40);
+  const std::filesystem::path video = workspace / "in/right.avi";
+  std::filesystem::resize_file(video, std::filesystem::file_size(video) * 3 / 4);
+  const Outcome outcome = run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " +
+                                      (workspace / "out").string() + " --json");
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.error;
+  const size_t rows = read_forces(workspace / "out/forces.csv").size();
+  EXPECT_GT(rows, 20u);
+  EXPECT_LT(rows, 40u);
+  EXPECT_EQ(static_cast<size_t>(frames_in(workspace / "out/overlay.mp4")), rows);
+  EXPECT_TRUE(std::filesystem::exists(workspace / "out/report.html"));
+}
+
+TEST(Program, CompareAnswersInJson) {
+  const Workspace workspace;
+  write_file(workspace / "truth.csv",
+             "frame,time_s,in_contact,fx_N,fy_N,fz_N,force_N,tip_x_mm,tip_y_mm,tip_z_mm\n"
+             "0,0,0,0,0,0,0,1,2,90\n1,0.04,1,0,0,-2,2,1,2,90\n");
+  write_file(workspace / "forces.csv",
+             "frame,time_s,in_contact,fx_N,fy_N,fz_N,force_N,tip_x_mm,tip_y_mm,tip_z_mm\n"
+             "0,0,0,0,0,0,0,1,2,91\n1,0.04,1,0,0,-1,1,1,2,91\n");
+  const Outcome outcome = run_palpate("compare " + (workspace / "forces.csv").string() + " " +
+                                      (workspace / "truth.csv").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_NEAR(json["force_nrmse_pct"].get<double>(), 100 * std::sqrt(0.5) / 2, 1e-9);
+  EXPECT_NEAR(json["tip_rmse_mm"].get<double>(), 1, 1e-9);
+}
+
+TEST(Program, TheScenePageIsWhatTheProgramSaysOfItself) {
+  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/scene.md");
+  const Outcome outcome = run_palpate("--document-scene");
+  ASSERT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(page, HasSubstr(outcome.output)) << "docs/scene.md is behind: run ./dev docs";
+}
+
+}  // namespace
+}  // namespace palpate::test
