@@ -29,7 +29,9 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& area, const ColourTable& ta
   const int gap = cvRound(8 * scale);
   draw_text(image, bar.title, {area.x + gap, area.y + gap + cvRound(text_px)}, text_px, kInk);
 
-  const int top = area.y + 3 * gap + cvRound(text_px), bottom = area.br().y - 2 * gap;
+  draw_text(image, bar.note, {area.x + gap, area.br().y - gap}, text_px, kFaintInk);
+  const int note_px = bar.note.empty() ? 0 : cvRound(text_px) + gap;
+  const int top = area.y + 3 * gap + cvRound(text_px), bottom = area.br().y - 2 * gap - note_px;
   const cv::Rect strip(area.x + gap, top, cvRound(14 * scale), bottom - top);
   for (int y = strip.y; y < strip.br().y; ++y) {
     const cv::Vec3b colour = colour_at(table, (bottom - 1 - y) / std::max(1.0, strip.height - 1.0));

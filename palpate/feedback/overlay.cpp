@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
@@ -20,6 +22,9 @@ const cv::Scalar kGood{110, 210, 90}, kIdle{190, 190, 190}, kDoubt{60, 180, 250}
 
 /// The colour bar begins at the stress of this strain, so that noise does not fill it.
 constexpr double kStrainOfLowestScale = 0.02;
+/// Share of the surface whose stress may lie above the scale: at the rim of the patch that the tip holds, stress grows
+/// without limit under refinement, and a scale that followed it would show nothing of the rest.
+constexpr double kShareAboveScale = 0.01;
 /// Share of the scale from which on stress has its full opacity.
 constexpr double kShareOfFullOpacity = 0.35;
 
@@ -63,6 +68,25 @@ bool has_force(const ForceEstimate& estimate) {
   return estimate.status == FrameStatus::ok || estimate.status == FrameStatus::map_stale;
 }
 
+/// The stress that `kShareAboveScale` of the surface exceeds, kPa.
+double characteristic_stress_kPa(const ForceEstimate& e) {
+  std::vector<std::pair<double, double>> stress_and_area;
+  double total_area = 0;
+  for (const Triangle& t : e.boundary) {
+    const size_t a = static_cast<size_t>(t[0]), b = static_cast<size_t>(t[1]), c = static_cast<size_t>(t[2]);
+    const std::vector<Vec3>& p = e.deformed_nodes_mm;
+    const double area = 0.5 * (p[b] - p[a]).cross(p[c] - p[a]).norm();
+    const std::vector<double>& stress = e.node_von_mises_kPa;
+    stress_and_area.emplace_back((stress[a] + stress[b] + stress[c]) / 3, area);
+    total_area += area;
+  }
+  std::sort(stress_and_area.begin(), stress_and_area.end(), std::greater<>());
+  double area_above = 0;
+  for (const auto& [stress, area] : stress_and_area)
+    if ((area_above += area) >= kShareAboveScale * total_area) return stress;
+  return 0;
+}
+
 std::pair<std::string, cv::Scalar> words_of(FrameStatus status) {
   switch (status) {
     case FrameStatus::ok:
@@ -99,7 +123,7 @@ void describe(Settings& settings, OverlayOptions& o) {
                   "viridis: perceptually ordered; jet: as in the paper");
   settings.number("opacity", o.opacity, {.least = 0, .most = 1}, "of the colour at the highest stress");
   settings.number("stress_scale_kPa", o.stress_scale_kPa, {.least = 0, .most = 1e9},
-                  "end of the colour bar; 0 = follows the highest stress in round steps");
+                  "end of the colour bar; 0 = follows the stress in round steps, never down");
   settings.flag("chart", o.chart, "draw the force over time");
   settings.number("chart_duration_s", o.chart_duration_s, {.least = 1, .most = 600}, "time that the chart shows");
 }
@@ -134,11 +158,10 @@ void OverlayPainter::follow_scales(const ForceEstimate& estimate) {
   if (estimate.status == FrameStatus::no_contact) force_N = 0;
   chart_.add(estimate.time_s, force_N);
   if (!has_force(estimate)) return;
-  force_scale_N_ = std::max(force_scale_N_, round_up(*force_N));
   nodal_force_scale_N_ = std::max(nodal_force_scale_N_, round_up(estimate.mean_nodal_force_N));
-  if (options_.stress_scale_kPa > 0) return;
-  for (const double stress : estimate.node_von_mises_kPa)
-    if (stress > stress_scale_kPa_) stress_scale_kPa_ = round_up(stress);
+  if (options_.stress_scale_kPa > 0 || !stress_is_trusted(estimate)) return;
+  const double stress_kPa = characteristic_stress_kPa(estimate);
+  if (stress_kPa > stress_scale_kPa_) stress_scale_kPa_ = round_up(stress_kPa);
 }
 
 bool OverlayPainter::shows_instrument(const cv::Mat& rectified_mask, int x, int y) const {
@@ -214,7 +237,7 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   }
 
   // As long in the image as it would be in space; along the line of sight a cross (away) or a dot (towards the camera).
-  const double length_px = (25 + 65 * force_N / force_scale_N_) * scale;
+  const double length_px = (25 + 65 * force_N / chart_.most_N()) * scale;
   const double length_mm = length_px * estimate.tip_mm.z() / rectification_.focal_px;
   const Vec3 head_mm = estimate.tip_mm + estimate.force_N / force_N * length_mm;
   cv::Point2d head = head_mm.z() < 1 ? tip : project_to_recorded_left(rectification_.rig, head_mm);
@@ -259,7 +282,7 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
 
   const int bar_width = px(118);
   draw_colour_bar(image, {image.cols - bar_width - px(8), px(8), bar_width, px(220)}, colours_,
-                  {0, stress_scale_kPa_, "von Mises (kPa)"}, scale);
+                  {0, stress_scale_kPa_, "von Mises (kPa)", "max " + three_digits(estimate.max_von_mises_kPa)}, scale);
 }
 
 void OverlayPainter::draw_frame(cv::Mat& image, const ForceEstimate& estimate) const {

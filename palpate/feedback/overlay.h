@@ -52,7 +52,6 @@ class OverlayPainter {
   cv::Mat rectified_px_;  // CV_16SC2, rectified pixel of each recorded one; empty when they are the same
   double stress_scale_kPa_;
   double nodal_force_scale_N_ = 0;
-  double force_scale_N_ = 0;
   StripChart chart_;
   VisibleTriangles visible_;
   std::vector<ScreenVertex> vertices_;

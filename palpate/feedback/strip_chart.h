@@ -16,6 +16,9 @@ class StripChart {
   /// `force_N` is empty in a frame without an answer: the curve has a gap there.
   void add(double time_s, std::optional<double> force_N);
 
+  /// End of the axis of force, N.
+  double most_N() const { return most_N_; }
+
   /// Draws the chart with axes, ticks and units on a dark veil in `area` of a BGR image; `colour` (BGR) is the curve's.
   void draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& colour, double scale) const;
 

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/quiet_opencv.h"
 
 namespace palpate {
 namespace {
@@ -37,6 +38,7 @@ VideoWriter::VideoWriter(const std::filesystem::path& file, double fps, const cv
   state_->file = file;
   state_->size = size;
   state_->check_free_space();
+  const QuietOpenCv quiet;
   for (const char* codec : {"avc1", "mp4v"}) {
     const int fourcc = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
     if (state_->writer.open(file.string(), cv::CAP_FFMPEG, fourcc, fps, size)) return;
@@ -57,6 +59,7 @@ void VideoWriter::write(const cv::Mat& bgr) {
 
 void VideoWriter::finish() {
   state_->writer.release();
+  const QuietOpenCv quiet;
   const cv::VideoCapture reader(state_->file.string(), cv::CAP_FFMPEG);
   const int frames = reader.isOpened() ? static_cast<int>(reader.get(cv::CAP_PROP_FRAME_COUNT)) : 0;
   if (frames < state_->frames)
