@@ -216,8 +216,8 @@ TEST(Overlay, DrawsALongerArrowForAGreaterForce) {
     while (image.at<cv::Vec3b>(270, 480 + length) != kTissue) ++length;
     return length;
   };
-  const int strong = arrow_px(10), weak = arrow_px(2);
-  EXPECT_GT(strong, weak + 20);
+  const int strong = arrow_px(19), weak = arrow_px(1);
+  EXPECT_GT(strong, weak + 30);
 }
 
 TEST(Overlay, IsTheSameForEveryThreadCount) {
