@@ -258,8 +258,9 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   const double text_px = 14 * scale;
   const std::string text = three_digits(force_N) + (estimate.status == FrameStatus::map_stale ? " N ?" : " N");
   const cv::Point2d away = along_sight ? cv::Point2d(0, -1) : (head - tip) * (1 / cv::norm(head - tip));
-  const cv::Point centre(head + away * (text_px + (along_sight ? 18 : 8) * scale));
   const int half = text_width(text, text_px, true) / 2 + px(4);
+  const double gap = std::abs(away.x) * half + std::abs(away.y) * text_px + (along_sight ? 18 : 8) * scale;
+  const cv::Point centre(head + away * gap);
   const cv::Rect inside(half, px(24), std::max(0, image.cols - 2 * half), std::max(0, image.rows - px(60)));
   draw_rimmed_text(image, text, clamped(centre + cv::Point(0, cvRound(text_px / 2)), inside), text_px, colour,
                    TextAnchor::centre);
@@ -280,9 +281,11 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
   for (int i = 0; i < warning_lines; ++i)
     draw_text(image, estimate.warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kDoubt);
 
+  const std::string greatest =
+      stress_is_trusted(estimate) ? "max " + three_digits(estimate.max_von_mises_kPa) : "max -";
   const int bar_width = px(118);
   draw_colour_bar(image, {image.cols - bar_width - px(8), px(8), bar_width, px(220)}, colours_,
-                  {0, stress_scale_kPa_, "von Mises (kPa)", "max " + three_digits(estimate.max_von_mises_kPa)}, scale);
+                  {0, stress_scale_kPa_, "von Mises (kPa)", greatest}, scale);
 }
 
 void OverlayPainter::draw_frame(cv::Mat& image, const ForceEstimate& estimate) const {

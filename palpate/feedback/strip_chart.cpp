@@ -20,7 +20,7 @@ void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& co
   draw_veil(image, area);
   const double text_px = 8 * scale;
   const auto px = [scale](double size) { return cvRound(size * scale); };
-  const cv::Rect plot(area.x + px(38), area.y + px(24), area.width - px(54), area.height - px(46));
+  const cv::Rect plot(area.x + px(38), area.y + px(30), area.width - px(54), area.height - px(52));
   draw_text(image, "force (N)", {area.x + px(8), area.y + px(15)}, text_px, kInk);
 
   const double first_s = samples_.empty() ? 0 : std::max(samples_.front().time_s, samples_.back().time_s - duration_s_);
