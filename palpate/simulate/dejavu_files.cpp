@@ -40,10 +40,10 @@ StereoVideoWriter::StereoVideoWriter(const std::filesystem::path& folder, const 
     : files_(std::make_unique<Files>()) {
   const cv::Size size(camera.width, camera.height);
   const auto open = [&](cv::VideoWriter& writer, const char* name) {
-    // MPEG-4 part 2 at the bit rate that OpenCV asks for keeps the grain of the texture; its H.264 preset blurs it.
-    const auto file = folder / name;
-    if (!writer.open(file.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), camera.fps, size))
-      throw Unfinished(fmt::format("{}: the video cannot be written", file.string()));
+    // H.264 keeps more of the tissue's grain than MPEG-4 part 2; some builds of FFmpeg lack its encoder.
+    for (const int codec : {cv::VideoWriter::fourcc('a', 'v', 'c', '1'), cv::VideoWriter::fourcc('m', 'p', '4', 'v')})
+      if (writer.open((folder / name).string(), cv::CAP_FFMPEG, codec, camera.fps, size)) return;
+    throw Unfinished(fmt::format("{}: the video cannot be written", (folder / name).string()));
   };
   open(files_->left, "left.mp4");
   open(files_->right, "right.mp4");

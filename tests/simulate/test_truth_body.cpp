@@ -1,0 +1,106 @@
+#include <gtest/gtest.h>
+
+#include "palpate/contact/equilibrium.h"
+#include "palpate/core/errors.h"
+#include "palpate/simulate/organ_shape.h"
+#include "palpate/simulate/truth_body.h"
+#include "palpate/simulate/uterus_demo.h"
+
+namespace palpate {
+namespace {
+
+// The demo's organ, coarse, touched where its surface is nearest to the camera.
+class TruthBodyTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    demo = uterus_demo();
+    organ = make_organ(demo.simulate.body, 1200);
+    const std::vector<Vec3> normals = vertex_normals(organ.vertices_mm, organ.triangles);
+    size_t nearest = 0;
+    for (size_t i = 0; i < organ.vertices_mm.size(); ++i)
+      if (organ.vertices_mm[i].z() < organ.vertices_mm[nearest].z()) nearest = i;
+    touch = organ.vertices_mm[nearest];
+    normal = normals[nearest];
+    body = make(touch, normal);
+  }
+
+  TruthBody make(const Vec3& at, const Vec3& outward) const {
+    return make_truth_body(
+        organ, 1200, demo.attachments, [](const Vec3&) { return cv::Point2d(); }, at, outward, 4);
+  }
+
+  SimulatedCase demo;
+  Surface organ;
+  Vec3 touch, normal;
+  TruthBody body;
+};
+
+TEST_F(TruthBodyTest, TiesOnlyFreeSurfaceNodesNearTheContact) {
+  ASSERT_GE(body.footprint.samples.size(), 6u);
+  for (const auto& sample : body.footprint.samples) {
+    EXPECT_LT((body.mesh.nodes_mm[static_cast<size_t>(sample.nodes[0])] - touch).norm(), 4.5);
+    EXPECT_EQ(sample.barycentric, Vec3::UnitX());
+  }
+  EXPECT_NEAR(body.patch_radius_mm, 4, 0.8);
+}
+
+TEST_F(TruthBodyTest, RefusesAContactOnAttachedTissue) {
+  size_t farthest = 0;
+  for (size_t i = 0; i < organ.vertices_mm.size(); ++i)
+    if (organ.vertices_mm[i].z() > organ.vertices_mm[farthest].z()) farthest = i;
+  EXPECT_THROW(make(organ.vertices_mm[farthest], Vec3::UnitZ()), BadInput);
+}
+
+// Two routes to the force besides the multipliers: what the attachments hold, and the work against the energy.
+TEST_F(TruthBodyTest, ForceIsWhatTheAttachmentsHoldAndTheSlopeOfTheEnergy) {
+  const TetModel model(body.mesh, demo.tissue, body.fixed_nodes);
+  EquilibriumOptions precise;
+  precise.relative_residual = 1e-8;
+  EquilibriumSolver solver(model, precise);
+  solver.hold(body.footprint);
+  const Vec3 pull = 1.5 * normal;
+  const double step = 1e-3;
+  const auto energy_at = [&](const Vec3& move) { return model.energy(solver.solve(move).u); };
+  const Equilibrium held = solver.solve(pull);
+  ASSERT_TRUE(held.converged);
+  EXPECT_GT(held.force_N.dot(normal), 1);  // a pull outwards is a force outwards on the tissue
+
+  const Eigen::VectorXd internal = model.internal_force(held.u);
+  Vec3 at_attachments = Vec3::Zero();
+  for (int node : body.fixed_nodes) at_attachments += internal.segment<3>(3 * node);
+  EXPECT_NEAR((held.force_N + at_attachments).norm() / held.force_N.norm(), 0, 1e-6);
+
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 along = step * Vec3::Unit(k);
+    const double slope = (energy_at(pull + along) - energy_at(pull - along)) / (2 * step);
+    EXPECT_NEAR(slope, held.force_N[k], 1e-4 * held.force_N.norm());
+  }
+}
+
+TEST_F(TruthBodyTest, SkinFollowsAnAffineMotionOfTheNodes) {
+  const Skin skin = attach_skin(organ.vertices_mm, body.mesh.nodes_mm, body.boundary);
+  Eigen::VectorXd u(3 * static_cast<Eigen::Index>(body.mesh.nodes_mm.size()));
+  Mat3 gradient;
+  gradient << 0.02, -0.01, 0.03, 0.01, 0.04, 0, -0.02, 0.01, -0.03;
+  for (size_t i = 0; i < body.mesh.nodes_mm.size(); ++i)
+    u.segment<3>(3 * static_cast<Eigen::Index>(i)) = gradient * (body.mesh.nodes_mm[i] - touch) + Vec3(1, 2, 3);
+  const std::vector<Vec3> moved = moved_skin(skin, organ.vertices_mm, u);
+  for (size_t i = 0; i < moved.size(); ++i) {
+    const Vec3 expected = organ.vertices_mm[i] + gradient * (organ.vertices_mm[i] - touch) + Vec3(1, 2, 3);
+    EXPECT_LT((moved[i] - expected).norm(), 0.05);  // the mesh's boundary lies up to 1 mm beside the fine surface
+  }
+}
+
+TEST_F(TruthBodyTest, SkinOfTheBoundaryItselfIsExact) {
+  const Skin skin = attach_skin(body.mesh.nodes_mm, body.mesh.nodes_mm, body.boundary);
+  Eigen::VectorXd u = Eigen::VectorXd::Random(3 * static_cast<Eigen::Index>(body.mesh.nodes_mm.size()));
+  const std::vector<Vec3> moved = moved_skin(skin, body.mesh.nodes_mm, u);
+  for (const Triangle& triangle : body.boundary)
+    for (int node : triangle) {
+      const auto i = static_cast<size_t>(node);
+      EXPECT_LT((moved[i] - body.mesh.nodes_mm[i] - u.segment<3>(3 * node)).norm(), 1e-9);
+    }
+}
+
+}  // namespace
+}  // namespace palpate
