@@ -119,7 +119,7 @@ struct RunFiles {
   void close() {
     overlay.finish();
     Report report;
-    report.title = scene_file.file.stem().string();
+    report.title = options.folder.filename().string();
     report.rows = rows;
     if (!options.truth.empty()) report.truth = read_forces(options.truth);
     report.times = times;

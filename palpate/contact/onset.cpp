@@ -1,40 +1,53 @@
 #include "palpate/contact/onset.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 
 namespace {
-constexpr size_t kRecentFrames = 6;
-/// A tip that moved at least this far per frame was approaching, ...
-constexpr double kApproachStep_mm = 0.25;
-/// ... and has come to rest when its step falls below this share of it.
-constexpr double kRestShare = 0.3;
+
+constexpr size_t kRecentFrames = 8;
+/// A tip that moved at least this far from one frame to the next was approaching.
+constexpr double kApproachStep_mm = 0.3;
+/// A tip is at rest when it moves less than this from one frame to the next: across the viewing ray, where it is seen
+/// well, ...
+constexpr double kRestAcross_mm = 0.15;
+/// ... and along it, where endoscopic baselines leave noise.
+constexpr double kRestAlong_mm = 0.6;
+constexpr double kLeaveDistance_mm = 2;
+
+bool at_rest(const Vec3& before, const Vec3& now) {
+  const Vec3 ray = now.normalized(), step = now - before;
+  const double along = step.dot(ray);
+  return (step - along * ray).norm() < kRestAcross_mm && std::abs(along) < kRestAlong_mm;
+}
+
 }  // namespace
 
 bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& tip_mm) {
+  if (let_go_at_mm_ && (tip_mm - *let_go_at_mm_).norm() > kLeaveDistance_mm) let_go_at_mm_.reset();
   recent_tips_.push_back(tip_mm);
   if (recent_tips_.size() > kRecentFrames) recent_tips_.pop_front();
+  if (let_go_at_mm_ || recent_tips_.size() < 3) return false;
 
-  const double reach_mm = threshold_mm_ + std::min(2 * gap_deviation_mm, threshold_mm_);
-  armed_ = gap_mm <= reach_mm;
-  if (gap_mm > 2 * threshold_mm_) has_left_ = true;
-  if (!armed_ || !has_left_ || recent_tips_.size() < 3) return false;
+  const double slack_mm = std::min(2 * gap_deviation_mm, threshold_mm_);
+  if (gap_mm > threshold_mm_ + slack_mm) return false;
+  if (gap_mm < -(threshold_mm_ + slack_mm)) return true;
 
-  double fastest_mm = 0;
+  double longest_step_mm = 0;
   for (size_t i = 1; i < recent_tips_.size(); ++i)
-    fastest_mm = std::max(fastest_mm, (recent_tips_[i] - recent_tips_[i - 1]).norm());
-  const double step_mm = (recent_tips_.back() - recent_tips_[recent_tips_.size() - 2]).norm();
-  const bool came_to_rest = fastest_mm > kApproachStep_mm && step_mm < kRestShare * fastest_mm;
-  const bool is_inside = gap_mm < -gap_deviation_mm;
-  if (!came_to_rest && !is_inside) return false;
-  has_left_ = false;
-  return true;
+    longest_step_mm = std::max(longest_step_mm, (recent_tips_[i] - recent_tips_[i - 1]).norm());
+  return longest_step_mm > kApproachStep_mm && at_rest(recent_tips_[recent_tips_.size() - 2], recent_tips_.back());
 }
 
-void OnsetDetector::reset() {
+void OnsetDetector::lose() {
   recent_tips_.clear();
-  armed_ = false;
+}
+
+void OnsetDetector::let_go(const Vec3& tip_mm) {
+  recent_tips_.clear();
+  let_go_at_mm_ = tip_mm;
 }
 
 }  // namespace palpate

@@ -1,29 +1,33 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 
 #include "palpate/core/geometry.h"
 
 namespace palpate {
 
-/// Decides when a free tip begins to touch (Eq. 4 with hysteresis): armed within the threshold of the surface, the
-/// contact begins when the gap has closed within the tip's deviation, or when an approaching tip comes to rest there.
+/// Decides when a free tip begins to touch (Eq. 4 with hysteresis): armed within the threshold of the surface, widened
+/// by the tip's deviation; the contact begins when an approaching tip comes to rest there, or when it is surely inside.
+/// A tip on its way through the armed zone does not touch yet: counting its displacement from there would preload the
+/// tissue.
 class OnsetDetector {
  public:
   explicit OnsetDetector(double threshold_mm) : threshold_mm_(threshold_mm) {}
 
-  /// `gap_mm`: signed distance of the tip to the deformed surface; `gap_deviation_mm`: one standard deviation of it;
-  /// `tip_mm`: for the tip's speed. True in the frame in which the contact begins.
+  /// `gap_mm`: signed distance of the tip to the surface; `gap_deviation_mm`: one standard deviation of it; `tip_mm`:
+  /// in the left camera frame. True in the frame in which the contact begins. Call once per frame while the tip is
+  /// free.
   bool update(double gap_mm, double gap_deviation_mm, const Vec3& tip_mm);
 
-  bool armed() const { return armed_; }
-  /// Forgets the approach (the tip was lost, or has let go).
-  void reset();
+  /// The tip was lost: what it did before says nothing about what comes.
+  void lose();
+  /// The tip has let go at `tip_mm` and has to leave that place before it can touch again.
+  void let_go(const Vec3& tip_mm);
 
  private:
   double threshold_mm_;
-  bool armed_ = false;
-  bool has_left_ = true;  // after a release the tip has to leave the surface before it can touch again
+  std::optional<Vec3> let_go_at_mm_;
   std::deque<Vec3> recent_tips_;
 };
 

@@ -47,6 +47,7 @@ struct ForceEstimator::State {
   TissueMotion tissue_motion;
   std::optional<HeldContact> held;
   Vec3 onset_tip_mm = Vec3::Zero();
+  Vec3 last_tip_mm = Vec3::Zero();
   int lost_frames = 0;
 
   State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
@@ -73,11 +74,11 @@ struct ForceEstimator::State {
                         std::max(kLeastWatched_mm, kWatchedRadii * radius_mm));
   }
 
-  void end_contact() {
+  void end_contact(const Vec3& tip_mm) {
     held.reset();
     tracker.unmark();
     tissue_motion.stop();
-    onset.reset();
+    onset.let_go(tip_mm);
   }
 
   /// Where the free tip stands against the map at rest, and whether it begins to touch (Eq. 4).
@@ -92,7 +93,7 @@ struct ForceEstimator::State {
   std::optional<Equilibrium> solve_contact(const RectifiedPair& pair, const TipObservation& tip,
                                            ForceEstimate& estimate) {
     if (tip.closed && !*tip.closed) {
-      end_contact();
+      end_contact(tip.tip_mm);
       return std::nullopt;
     }
     const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);
@@ -100,7 +101,7 @@ struct ForceEstimator::State {
     const HeldContact::Answer answer = held->move(p);
     if (answer.let_go) {
       estimate.tip_mm = tip.tip_mm;
-      end_contact();
+      end_contact(tip.tip_mm);
       return std::nullopt;
     }
     const std::vector<TissuePoint> seen = tissue_motion.update(pair, tip.left_mask, tip.right_mask);
@@ -110,7 +111,7 @@ struct ForceEstimator::State {
         compare_motion(seen, displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest));
     if (follow.let_go) {
       estimate.tip_mm = tip.tip_mm;
-      end_contact();
+      end_contact(tip.tip_mm);
       return std::nullopt;
     }
     estimate.misfit_mm = follow.misfit_mm;
@@ -162,11 +163,12 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
 
   if (!tip.visible) {
     estimate.status = FrameStatus::tool_lost;
-    if (s.held && ++s.lost_frames > kMostLostFrames) s.end_contact();
-    if (!s.held) s.onset.reset();
+    if (s.held && ++s.lost_frames > kMostLostFrames) s.end_contact(s.last_tip_mm);
+    if (!s.held) s.onset.lose();
     return estimate;
   }
   s.lost_frames = 0;
+  s.last_tip_mm = tip.tip_mm;
   estimate.tip_mm = tip.tip_mm;
 
   if (!s.held && frame.index > s.map.frame) s.look_for_contact(pair, tip);
