@@ -12,17 +12,16 @@
 namespace palpate {
 namespace {
 
-RTCRay make_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float end) {
-  RTCRay ray{};
-  ray.org_x = origin.x();
-  ray.org_y = origin.y();
-  ray.org_z = origin.z();
-  ray.dir_x = direction.x();
-  ray.dir_y = direction.y();
-  ray.dir_z = direction.z();
-  ray.tfar = end;
-  ray.mask = ~0u;
-  return ray;
+template <class Rays>
+void set_ray(Rays& rays, size_t i, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float end) {
+  rays.org_x[i] = origin.x();
+  rays.org_y[i] = origin.y();
+  rays.org_z[i] = origin.z();
+  rays.dir_x[i] = direction.x();
+  rays.dir_y[i] = direction.y();
+  rays.dir_z[i] = direction.z();
+  rays.tfar[i] = end;
+  rays.mask[i] = ~0u;
 }
 
 }  // namespace
@@ -80,31 +79,64 @@ void RayScene::commit() {
 }
 
 RayHit RayScene::first_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const {
-  RTCRayHit query{};
-  query.ray = make_ray(origin, direction, std::numeric_limits<float>::infinity());
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(tree_->scene, &query);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(tree_->scene, &context, &query);
-#endif
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return {static_cast<int>(query.hit.geomID), static_cast<int>(query.hit.primID), query.hit.u, query.hit.v,
-          query.ray.tfar};
+  Bundle<Eigen::Vector3f> directions;
+  directions.fill(direction);
+  Bundle<RayHit> hits;
+  first_hits(origin, directions, hits);
+  return hits[0];
 }
 
-bool RayScene::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const {
-  RTCRay ray = make_ray(from, to - from, 1);
+void RayScene::first_hits(const Eigen::Vector3f& origin, const Bundle<Eigen::Vector3f>& directions,
+                          Bundle<RayHit>& hits) const {
+  alignas(64) int all[kBundle];
+  alignas(64) RTCRayHit16 query{};
+  for (size_t i = 0; i < kBundle; ++i) {
+    all[i] = -1;
+    set_ray(query.ray, i, origin, directions[i], std::numeric_limits<float>::infinity());
+    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+  }
 #if RTC_VERSION_MAJOR >= 4
-  rtcOccluded1(tree_->scene, &ray);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(all, tree_->scene, &query, &arguments);
 #else
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcOccluded1(tree_->scene, &context, &ray);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(all, tree_->scene, &context, &query);
 #endif
-  return ray.tfar < 0;
+  for (size_t i = 0; i < kBundle; ++i) {
+    if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID)
+      hits[i] = {};
+    else
+      hits[i] = {static_cast<int>(query.hit.geomID[i]), static_cast<int>(query.hit.primID[i]), query.hit.u[i],
+                 query.hit.v[i], query.ray.tfar[i]};
+  }
+}
+
+Bundle<bool> RayScene::blocked(const Bundle<bool>& wanted, const Bundle<Eigen::Vector3f>& from,
+                               const Bundle<Eigen::Vector3f>& to) const {
+  alignas(64) int valid[kBundle];
+  alignas(64) RTCRay16 rays{};
+  for (size_t i = 0; i < kBundle; ++i) {
+    valid[i] = wanted[i] ? -1 : 0;
+    set_ray(rays, i, from[i], to[i] - from[i], 1);
+  }
+#if RTC_VERSION_MAJOR >= 4
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcOccluded16(valid, tree_->scene, &rays, &arguments);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded16(valid, tree_->scene, &context, &rays);
+#endif
+  Bundle<bool> answer;
+  for (size_t i = 0; i < kBundle; ++i) answer[i] = wanted[i] && rays.tfar[i] < 0;
+  return answer;
 }
 
 }  // namespace palpate

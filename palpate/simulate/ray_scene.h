@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -15,6 +16,11 @@ struct RayHit {
   float length = 0;  ///< of the ray, in units of its direction
 };
 
+/// Neighbouring rays are traced together.
+inline constexpr int kBundle = 16;
+template <class T>
+using Bundle = std::array<T, kBundle>;
+
 /// Triangle surfaces and where rays meet them (Embree 3 or 4), mm.
 class RayScene {
  public:
@@ -29,8 +35,10 @@ class RayScene {
   void commit();
 
   RayHit first_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
-  /// Something stands between the two points.
-  bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;
+  void first_hits(const Eigen::Vector3f& origin, const Bundle<Eigen::Vector3f>& directions, Bundle<RayHit>& hits) const;
+  /// Whether something stands between the two points, asked only where `wanted`; false elsewhere.
+  Bundle<bool> blocked(const Bundle<bool>& wanted, const Bundle<Eigen::Vector3f>& from,
+                       const Bundle<Eigen::Vector3f>& to) const;
 
  private:
   struct Tree;

@@ -1,6 +1,5 @@
 #include "palpate/simulate/render.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -23,7 +22,7 @@ using Vec3f = Eigen::Vector3f;
 const float kShadowStart_mm = 0.05f;  // shadow rays leave the surface by this much
 const float kAmbient = 0.015f;        // light that has been around in the cavity
 const float kSameDepth = 0.02f;       // neighbouring samples belong together when their depths differ by less
-const int kEdgeSteps = 4;             // samples per side of a pixel where surfaces meet
+const float kBrightest = 2;           // a highlight counts no more than this where surfaces meet
 
 struct DrawnSurface {
   std::vector<Triangle> triangles;
@@ -37,6 +36,14 @@ struct Sample {
   Vec3f colour = Vec3f::Zero();
   int surface = -1;
   float depth_mm = std::numeric_limits<float>::infinity();
+};
+
+struct Lit {
+  Vec3f around = Vec3f::Zero();  // light that came by way of the cavity
+  Vec3f direct = Vec3f::Zero();  // light from the scope, if nothing stands in between
+  bool faces_light = false;
+  Vec3f start = Vec3f::Zero();
+  Vec3f light_point = Vec3f::Zero();
 };
 
 bool belong_together(const Sample& a, const Sample& b) {
@@ -86,7 +93,8 @@ struct Renderer::Scene {
     return light_mm + Vec3f(r * std::cos(angle), r * std::sin(angle), 0);
   }
 
-  Vec3f shade(const RayHit& hit, const Vec3f& point, const Vec3f& to_eye, uint32_t bits) const {
+  // Light that leaves a point towards the eye, apart from what stands between it and the light.
+  Lit light_up(const RayHit& hit, const Vec3f& point, const Vec3f& to_eye, uint32_t bits) const {
     const DrawnSurface& surface = surfaces[static_cast<size_t>(hit.surface)];
     const Triangle& triangle = surface.triangles[static_cast<size_t>(hit.triangle)];
     const auto normal_at = [&](size_t k) -> const Vec3f& { return surface.normals[static_cast<size_t>(triangle[k])]; };
@@ -96,34 +104,62 @@ struct Renderer::Scene {
     const Texel texel = surface.texture.at(hit.triangle, hit.u, hit.v);
     const Vec3f normal = (smooth - texel.slope + smooth * smooth.dot(texel.slope)).normalized();
 
-    const Vec3f light_point = point_of_light(bits);
-    const Vec3f to_light_mm = light_point - point;
+    Lit lit;
+    lit.light_point = point_of_light(bits);
+    lit.start = point + kShadowStart_mm * smooth;
+    const Vec3f to_light_mm = lit.light_point - point;
     const float distance = to_light_mm.norm();
     const Vec3f to_light = to_light_mm / distance;
-    const float reference = static_cast<float>(look.light.reference_mm);
+    const auto reference = static_cast<float>(look.light.reference_mm);
     const float arriving = light_power * reference * reference / (distance * distance);
+    lit.around = kAmbient * arriving * texel.albedo;
     const float cosine = normal.dot(to_light);
-    Vec3f colour = kAmbient * arriving * texel.albedo;
-    if (cosine <= 0 || smooth.dot(to_light) <= 0) return colour;
-    if (rays.blocked(point + kShadowStart_mm * smooth, light_point)) return colour;
-    colour += arriving * cosine * texel.albedo;
-    colour.array() += arriving * specular(normal, to_light, to_eye, surface.alpha, surface.reflectance);
-    return colour;
+    if (cosine <= 0 || smooth.dot(to_light) <= 0) return lit;
+    lit.faces_light = true;
+    lit.direct = arriving * cosine * texel.albedo;
+    lit.direct.array() += arriving * specular(normal, to_light, to_eye, surface.alpha, surface.reflectance);
+    return lit;
   }
 
-  Sample sample(int eye, float x_px, float y_px, uint32_t frame) const {
+  void sample(int eye, const Bundle<float>& x_px, const Bundle<float>& y_px, uint32_t frame,
+              Bundle<Sample>& samples) const {
     const Vec3f origin = eye_mm(eye);
-    const Vec3f direction = ray_direction(x_px, y_px);
-    const RayHit hit = rays.first_hit(origin, direction);
-    Sample result;
-    if (hit.surface < 0) return result;
-    const uint32_t bits = hash_bits(static_cast<uint32_t>(static_cast<int>(std::lround(8 * x_px))),
-                                    static_cast<uint32_t>(static_cast<int>(std::lround(8 * y_px))),
-                                    2 * frame + static_cast<uint32_t>(eye), static_cast<uint32_t>(look.seed));
-    result.surface = hit.surface;
-    result.depth_mm = hit.length;
-    result.colour = shade(hit, origin + hit.length * direction, -direction.normalized(), bits);
-    return result;
+    Bundle<Vec3f> directions, from, to;
+    for (size_t i = 0; i < kBundle; ++i) directions[i] = ray_direction(x_px[i], y_px[i]);
+    Bundle<RayHit> hits;
+    rays.first_hits(origin, directions, hits);
+    Bundle<Lit> lit;
+    Bundle<bool> faces_light;
+    for (size_t i = 0; i < kBundle; ++i) {
+      if (hits[i].surface >= 0) {
+        const auto eighths = [](float px) { return static_cast<uint32_t>(static_cast<int>(std::lround(8 * px))); };
+        const uint32_t bits = hash_bits(eighths(x_px[i]), eighths(y_px[i]), 2 * frame + static_cast<uint32_t>(eye),
+                                        static_cast<uint32_t>(look.seed));
+        lit[i] = light_up(hits[i], origin + hits[i].length * directions[i], -directions[i].normalized(), bits);
+      }
+      from[i] = lit[i].start;
+      to[i] = lit[i].light_point;
+      faces_light[i] = lit[i].faces_light;
+    }
+    const Bundle<bool> blocked = rays.blocked(faces_light, from, to);
+    for (size_t i = 0; i < kBundle; ++i) {
+      samples[i].surface = hits[i].surface;
+      samples[i].depth_mm = hits[i].length;
+      samples[i].colour = lit[i].around;
+      if (!blocked[i]) samples[i].colour += lit[i].direct;
+    }
+  }
+
+  // Samples at x = first_x, first_x + 1, ...
+  void sample_row(int eye, float first_x, float y, uint32_t frame, Sample* samples, int count) const {
+    Bundle<float> x_px, y_px;
+    Bundle<Sample> bundle;
+    y_px.fill(y);
+    for (int start = 0; start < count; start += kBundle) {
+      for (int i = 0; i < kBundle; ++i) x_px[static_cast<size_t>(i)] = first_x + static_cast<float>(start + i);
+      sample(eye, x_px, y_px, frame, bundle);
+      std::copy_n(bundle.begin(), std::min(kBundle, count - start), samples + start);
+    }
   }
 
   // Middle and corners of a pixel belong to one smooth surface: their mean. Where surfaces meet: many samples.
@@ -131,19 +167,20 @@ struct Renderer::Scene {
                      const std::array<const Sample*, 4>& corners) const {
     bool smooth = true;
     for (const Sample* corner : corners) smooth = smooth && belong_together(middle, *corner);
-    if (smooth) {
-      Vec3f sum = 0.5f * middle.colour;
-      for (const Sample* corner : corners) sum += 0.125f * corner->colour;
-      return sum;
-    }
     Vec3f sum = Vec3f::Zero();
-    for (int j = 0; j < kEdgeSteps; ++j)
-      for (int i = 0; i < kEdgeSteps; ++i) {
-        const auto offset = [](int k) { return (static_cast<float>(k) + 0.5f) / kEdgeSteps - 0.5f; };
-        sum += sample(eye, static_cast<float>(x) + offset(i), static_cast<float>(y) + offset(j), frame)
-                   .colour.cwiseMin(2.0f);
-      }
-    return sum / static_cast<float>(kEdgeSteps * kEdgeSteps);
+    if (smooth) {
+      for (const Sample* corner : corners) sum += 0.125f * corner->colour;
+      return sum + 0.5f * middle.colour;
+    }
+    Bundle<float> x_px, y_px;
+    Bundle<Sample> samples;
+    for (int i = 0; i < kBundle; ++i) {
+      x_px[static_cast<size_t>(i)] = static_cast<float>(x) + (static_cast<float>(i % 4) + 0.5f) / 4 - 0.5f;
+      y_px[static_cast<size_t>(i)] = static_cast<float>(y) + (static_cast<float>(i / 4) + 0.5f) / 4 - 0.5f;
+    }
+    sample(eye, x_px, y_px, frame, samples);
+    for (const Sample& part : samples) sum += part.colour.cwiseMin(kBrightest) / kBundle;
+    return sum;
   }
 
   cv::Mat draw(int eye, uint32_t frame) const {
@@ -151,16 +188,16 @@ struct Renderer::Scene {
     const auto corner_columns = static_cast<size_t>(width) + 1;
     std::vector<Sample> corners(corner_columns * (static_cast<size_t>(height) + 1));
     tbb::parallel_for(0, height + 1, [&](int y) {
-      for (int x = 0; x <= width; ++x)
-        corners[static_cast<size_t>(y) * corner_columns + static_cast<size_t>(x)] =
-            sample(eye, static_cast<float>(x) - 0.5f, static_cast<float>(y) - 0.5f, frame);
+      sample_row(eye, -0.5f, static_cast<float>(y) - 0.5f, frame, &corners[static_cast<size_t>(y) * corner_columns],
+                 width + 1);
     });
     cv::Mat linear(height, width, CV_32FC3);
     tbb::parallel_for(0, height, [&](int y) {
+      std::vector<Sample> middles(static_cast<size_t>(width));
+      sample_row(eye, 0, static_cast<float>(y), frame, middles.data(), width);
       for (int x = 0; x < width; ++x) {
-        const Sample middle = sample(eye, static_cast<float>(x), static_cast<float>(y), frame);
         const Sample* corner = &corners[static_cast<size_t>(y) * corner_columns + static_cast<size_t>(x)];
-        const Vec3f rgb = pixel_colour(eye, x, y, frame, middle,
+        const Vec3f rgb = pixel_colour(eye, x, y, frame, middles[static_cast<size_t>(x)],
                                        {corner, corner + 1, corner + corner_columns, corner + corner_columns + 1});
         linear.at<cv::Vec3f>(y, x) = {rgb.z(), rgb.y(), rgb.x()};
       }
