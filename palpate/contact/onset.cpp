@@ -16,6 +16,8 @@ constexpr double kRestAcross_mm = 0.15;
 /// ... and along it, where endoscopic baselines leave noise.
 constexpr double kRestAlong_mm = 0.6;
 constexpr double kLeaveDistance_mm = 2;
+/// One frame may be a bad triangulation.
+constexpr int kFramesSurelyInside = 2;
 
 bool at_rest(const Vec3& before, const Vec3& now) {
   const Vec3 ray = now.normalized(), step = now - before;
@@ -33,7 +35,8 @@ bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& t
 
   const double slack_mm = std::min(2 * gap_deviation_mm, threshold_mm_);
   if (gap_mm > threshold_mm_ + slack_mm) return false;
-  if (gap_mm < -(threshold_mm_ + slack_mm)) return true;
+  frames_inside_ = gap_mm < -(threshold_mm_ + slack_mm) ? frames_inside_ + 1 : 0;
+  if (frames_inside_ > 0) return frames_inside_ >= kFramesSurelyInside;
 
   double longest_step_mm = 0;
   for (size_t i = 1; i < recent_tips_.size(); ++i)
@@ -46,7 +49,7 @@ void OnsetDetector::lose() {
 }
 
 void OnsetDetector::let_go(const Vec3& tip_mm) {
-  recent_tips_.clear();
+  lose();
   let_go_at_mm_ = tip_mm;
 }
 

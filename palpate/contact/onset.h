@@ -29,6 +29,7 @@ class OnsetDetector {
   double threshold_mm_;
   std::optional<Vec3> let_go_at_mm_;
   std::deque<Vec3> recent_tips_;
+  int frames_inside_ = 0;
 };
 
 }  // namespace palpate

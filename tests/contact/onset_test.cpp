@@ -31,7 +31,11 @@ TEST(Onset, ATipOnItsWayPastTheSurfaceDoesNotTouch) {
 }
 
 TEST(Onset, ATipThatGoesOnIntoTheTissueTouchesWhenItIsSurelyInside) {
-  EXPECT_EQ(onset_of({6, 4, 2, 0, -2.5, -4, -6}), 4);
+  EXPECT_EQ(onset_of({6, 4, 2, 0, -2.5, -4, -6}), 5);
+}
+
+TEST(Onset, OneBadTriangulationIsNoTouch) {
+  EXPECT_EQ(onset_of({8, 6, 4, 3, -2.5, 3, 4, 6}), -1);
 }
 
 TEST(Onset, AfterLettingGoTheTipHasToLeaveFirst) {
