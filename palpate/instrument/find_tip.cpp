@@ -24,6 +24,7 @@ struct EdgeLine {
 };
 
 constexpr int kLeastPixels = 60;
+constexpr double kSolid = 0.85;  // share of a slice of the shaft that belongs to the mask
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -108,7 +109,7 @@ Shaft fit_shaft(const std::vector<Slice>& slices) {
   Shaft shaft;
   std::vector<double> widths;
   for (const Slice& slice : slices)
-    if (slice.pixels > 0 && !slice.cut) widths.push_back(slice.width());
+    if (slice.pixels > 0 && !slice.cut) widths.push_back(std::min(slice.width(), 1.0 * slice.pixels));
   if (widths.size() < 8) return shaft;
   std::nth_element(widths.begin(), widths.begin() + static_cast<std::ptrdiff_t>(widths.size() * 3 / 4), widths.end());
   const double full_width = widths[widths.size() * 3 / 4];
@@ -118,12 +119,13 @@ Shaft fit_shaft(const std::vector<Slice>& slices) {
   for (size_t i = 0; i < slices.size(); ++i) {
     const Slice& slice = slices[i];
     if (slice.pixels == 0 || slice.cut || slice.width() < 0.5 * full_width) continue;
+    area += slice.width();
+    pixels += slice.pixels;
+    if (slice.pixels < kSolid * slice.width()) continue;  // between open jaws
     s.push_back(static_cast<double>(i));
     low.push_back(slice.low);
     high.push_back(slice.high);
     width.push_back(slice.width());
-    area += slice.width();
-    pixels += slice.pixels;
   }
   if (s.size() < 8) return shaft;
   shaft.low = fit_edge(s, low);
@@ -139,7 +141,7 @@ bool looks_like_an_instrument(const Shaft& shaft, double length) {
   if (width < 3 || shaft.slices < 0.6 * width || length < 1.3 * width) return false;
   const double straightness = std::max(1.5, 0.09 * width);
   return shaft.low.deviation < straightness && shaft.high.deviation < straightness &&
-         std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.85;
+         std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.6;
 }
 
 /// The far end in coordinates along and across the axis.

@@ -10,6 +10,9 @@ namespace {
 using Vector4 = Eigen::Vector4d;  // disparity at the tip, slope in x, slope in y, row offset
 using Matrix4 = Eigen::Matrix4d;
 
+// The outline lies in the plane of the axis whatever the shape of the instrument; how far the surface stands out of it
+// is only a guess, so the texture has little to say here.
+constexpr LayerNoise kNoise{30, 24};
 constexpr double kSlopeDeviation = 0.05;  // px/px; a shaft that halves its depth over the image has 0.05
 constexpr double kRowDeviation_px = 0.5;  // left by a good calibration
 constexpr double kLeastAgreement = 0.35;
@@ -44,7 +47,7 @@ System assemble(const Problem& problem, int level, const Vector4& p) {
   System system;
   const cv::Point2d tip = problem.tip;
   for (const PatchCell& cell : problem.left.cells[static_cast<size_t>(level)]) {
-    const CellEquations e = cell_equations(cell, problem.right, level, warp_cell(cell, problem, p));
+    const CellEquations e = cell_equations(cell, problem.right, level, warp_cell(cell, problem, p), kNoise);
     Eigen::Matrix<double, 2, 4> jacobian;
     jacobian << -1, -(cell.center_px.x - tip.x), -(cell.center_px.y - tip.y), 0, 0, 0, 0, 1;
     system.normal += jacobian.transpose() * e.normal * jacobian;

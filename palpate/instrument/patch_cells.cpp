@@ -8,10 +8,8 @@ namespace palpate {
 
 namespace {
 
-constexpr int kCell = 12;              // px of the level that a cell belongs to
-constexpr float kBrightnessNoise = 3;  // grey levels
-constexpr float kMetalNoise = 80;      // of 255; colour is recorded at half resolution
-constexpr float kOutlierAt = 3;        // noise levels at which a residual loses half its weight
+constexpr int kCell = 12;        // px of the level that a cell belongs to
+constexpr float kOutlierAt = 3;  // noise levels at which a residual loses half its weight
 
 constexpr float kOutside = -1e9f;
 constexpr size_t kLeastSamples = 12;
@@ -129,10 +127,11 @@ PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, cons
   return result;
 }
 
-CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp) {
+CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp,
+                             const LayerNoise& noise) {
   const cv::Mat& image =
       cell.outline ? layers.metal[static_cast<size_t>(level)] : layers.brightness[static_cast<size_t>(level)];
-  const float per_noise = 1 / (cell.outline ? kMetalNoise : kBrightnessNoise);
+  const float per_noise = 1 / (cell.outline ? noise.metal : noise.brightness);
   const float scale = 1.0f / static_cast<float>(1 << level);
   const float cx = scale * static_cast<float>(warp.center_px.x - layers.region.x);
   const float cy = scale * static_cast<float>(warp.center_px.y - layers.region.y);

@@ -50,6 +50,12 @@ struct CellWarp {
   cv::Matx22d linear = cv::Matx22d::eye();
 };
 
+/// Expected noise of the two layers, which is also their weight against each other; grey levels.
+struct LayerNoise {
+  float brightness;
+  float metal;
+};
+
 /// Lucas-Kanade's normal equations of one cell for a shift of its centre, with the cell's brightness offset eliminated
 /// and outliers weighted down. Residuals are in units of their expected noise.
 struct CellEquations {
@@ -61,6 +67,7 @@ struct CellEquations {
   double weight = 0;
 };
 
-CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp);
+CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp,
+                             const LayerNoise& noise);
 
 }  // namespace palpate

@@ -11,6 +11,8 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;  // translation of the tip, rotation about it
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+// Colour is recorded at half resolution: the outline guides from afar, the texture decides.
+constexpr LayerNoise kNoise{3, 80};
 constexpr double kRotationDeviation_rad = 0.02;  // an instrument in a trocar mostly translates
 constexpr double kLeastAgreement = 0.35;
 constexpr double kLeastMetal = 0.6;
@@ -85,7 +87,7 @@ void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const Instrume
     const Vec3 before = eye.point(keyframe.plane, cell.center_px, cell.height_px);
     const Vec3 now = moved(before, keyframe.tip_mm, p);
     if (now.z() < 5) continue;
-    const CellEquations e = cell_equations(cell, layers, level, warp_of(cell, eye, keyframe, p));
+    const CellEquations e = cell_equations(cell, layers, level, warp_of(cell, eye, keyframe, p), kNoise);
     Eigen::Matrix<double, 2, 3> projection;
     projection << f / now.z(), 0, -f * (now.x() - eye.shift_mm) / (now.z() * now.z()), 0, f / now.z(),
         -f * now.y() / (now.z() * now.z());

@@ -83,6 +83,25 @@ cv::Mat grey_pixels(const cv::Mat& half_bgr, const SegmentationModel& model) {
   return mask;
 }
 
+/// The part of the mask that hangs together with the border of the picture, with a margin. A highlight never does; an
+/// instrument does, also one that is not recognised yet.
+cv::Mat from_border(const cv::Mat& mask, const cv::Mat& half_picture_area) {
+  cv::Mat joined, labels;
+  cv::dilate(mask, joined, cv::Mat::ones(5, 5, CV_8U));
+  const int count = cv::connectedComponents(joined, labels, 8);
+  std::vector<uchar> at_border(static_cast<size_t>(count), 0);
+  cv::Mat inside;
+  cv::erode(half_picture_area, inside, cv::Mat::ones(5, 5, CV_8U), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
+  for (int y = 0; y < labels.rows; ++y)
+    for (int x = 0; x < labels.cols; ++x)
+      if (!inside.at<uchar>(y, x)) at_border[static_cast<size_t>(labels.at<int>(y, x))] = 255;
+  at_border[0] = 0;
+  cv::Mat result(mask.size(), CV_8U);
+  for (int y = 0; y < labels.rows; ++y)
+    for (int x = 0; x < labels.cols; ++x) result.at<uchar>(y, x) = at_border[static_cast<size_t>(labels.at<int>(y, x))];
+  return result;
+}
+
 /// The blobs that look like instruments, at half size.
 cv::Mat instrument_blobs(const cv::Mat& grey, const cv::Mat& half_picture_area) {
   cv::Mat mask;
@@ -169,9 +188,7 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
   coarse = instrument_blobs(grey, half_area);
 
   model.reference_mask = refine(static_bgr, coarse, model);
-  cv::Mat instrument;
-  cv::dilate(coarse, instrument, cv::Mat::ones(9, 9, CV_8U));
-  model.still_grey = grey & ~instrument;
+  model.still_grey = grey & ~from_border(grey, half_area);
   return model;
 }
 

@@ -28,6 +28,7 @@ constexpr double kTipDeviation_px = 0.7;  // where the mask ends against where t
 constexpr double kDisparityFloor_px = 0.05;
 constexpr double kBias_mm = 0.25;  // what does not average out over frames: outline, one side of the jaws seen
 constexpr double kMotionFloor_mm = 0.02;
+constexpr double kMotionModelShare = 0.04;  // of a displacement: light that does not move along, depths of the template
 
 /// One eye in one frame.
 struct EyeView {
@@ -89,6 +90,17 @@ std::optional<Detection> detect(const EyeView& left, const EyeView& right, const
   return detection;
 }
 
+InstrumentKeyframe make_keyframe(Detection detection, const EyeView& right) {
+  InstrumentKeyframe keyframe;
+  ImageTip right_tip = *right.tip;
+  right_tip.tip_px = detection.plane.origin_px - cv::Point2d(detection.plane.disparity[0], 0);
+  keyframe.right = make_template(right.layers, right.mask, right_tip, followed_length_px(right_tip));
+  keyframe.left = std::move(detection.left_template);
+  keyframe.plane = detection.plane;
+  keyframe.tip_mm = detection.tip_mm;
+  return keyframe;
+}
+
 }  // namespace
 
 struct TipTracker::State {
@@ -99,7 +111,8 @@ struct TipTracker::State {
   TipFilter filter;
   std::optional<ImageTip> last_left_tip, last_right_tip;  ///< where to look when a mask shows none
   std::optional<InstrumentKeyframe> keyframe;
-  RigidMotion motion;  ///< since the keyframe, as last measured
+  std::optional<InstrumentKeyframe> fresh_keyframe;  ///< of the last frame, should it be marked
+  RigidMotion motion;                                ///< since the keyframe, as last measured
   std::optional<double> last_time_s;
   int frames_alone = 0;
   int rejected = 0;
@@ -113,7 +126,9 @@ struct TipTracker::State {
   EyeView view(const cv::Mat& bgr, const SegmentationModel& model, const std::optional<ImageTip>& expected) const;
   std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
                                                    const std::optional<Detection>& detection, double seconds) const;
-  void take_keyframe(Detection detection, const EyeView& right);
+  void use_fresh_keyframe();
+  void advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
+               double seconds);
   void lose();
   TipObservation from_track(const RectifiedPair& pair);
   void report_since_mark(TipObservation& observation) const;
@@ -145,22 +160,54 @@ std::optional<RigidMotion> TipTracker::State::motion_since_keyframe(const EyeVie
   return best;
 }
 
-void TipTracker::State::take_keyframe(Detection detection, const EyeView& right) {
-  InstrumentKeyframe fresh;
-  ImageTip right_tip = *right.tip;
-  right_tip.tip_px = detection.plane.origin_px - cv::Point2d(detection.plane.disparity[0], 0);
-  fresh.right = make_template(right.layers, right.mask, right_tip, followed_length_px(right_tip));
-  fresh.left = std::move(detection.left_template);
-  fresh.plane = detection.plane;
-  fresh.tip_mm = detection.tip_mm;
-  keyframe = std::move(fresh);
+void TipTracker::State::use_fresh_keyframe() {
+  keyframe = std::move(fresh_keyframe);
+  fresh_keyframe.reset();
   motion = RigidMotion();
+  motion.agreement = 1;
+}
+
+void TipTracker::State::advance(const std::optional<RigidMotion>& measured, bool followed,
+                                const std::optional<Detection>& detection, double seconds) {
+  const TipFilter before = filter;
+  std::optional<RigidMotion> taken = measured;
+  const auto corrected = [&] { return filter.correct(detection->tip_mm, detection->covariance_mm2); };
+  if (followed) {
+    const Mat3 floor = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
+    filter.move(measured->translation_mm - motion.translation_mm, measured->covariance_mm2 + floor, seconds);
+  } else if (filter.started()) {
+    filter.predict(seconds);
+  }
+  if (detection && (!filter.started() || rejected >= kMostRejected)) {
+    filter.start(detection->tip_mm, detection->covariance_mm2);
+    rejected = 0;
+  } else if (detection && corrected()) {
+    rejected = 0;
+  } else if (detection) {
+    // Motion and detection contradict each other: the one that continues the path so far is right; a marked template,
+    // which the contact hangs on, has proved itself.
+    const TipFilter as_followed = filter;
+    filter = before;
+    filter.predict(seconds);
+    if (followed && !marked && corrected()) {
+      taken.reset();
+      rejected = 0;
+    } else {
+      filter = as_followed;
+      ++rejected;
+    }
+  }
+  if (taken)
+    motion = *taken;
+  else
+    motion.agreement = 0;
 }
 
 void TipTracker::State::lose() {
   visible = false;
   filter.stop();
   if (!marked) keyframe.reset();
+  fresh_keyframe.reset();
   frames_alone = rejected = 0;
 }
 
@@ -195,8 +242,9 @@ void TipTracker::State::report_since_mark(TipObservation& observation) const {
   Mat3 covariance = filter.position_covariance_mm2() + covariance_at_mark_mm2;
   if (motion_at_mark && motion.agreement > 0) {
     since = motion.translation_mm - motion_at_mark->translation_mm;
-    covariance =
-        motion.covariance_mm2 + motion_at_mark->covariance_mm2 + kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
+    const double model = kMotionModelShare * since.norm();
+    covariance = motion.covariance_mm2 + motion_at_mark->covariance_mm2 +
+                 (kMotionFloor_mm * kMotionFloor_mm + model * model) * Mat3::Identity();
   }
   observation.since_mark_mm = left_from_rectified * since;
   observation.since_mark_covariance_mm2 = left_from_rectified * covariance * left_from_rectified.transpose();
@@ -249,21 +297,7 @@ TipObservation TipTracker::update(const RectifiedPair& pair) {
     return observation;
   }
 
-  if (followed) {
-    const Mat3 floor = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
-    s.filter.move(measured->translation_mm - s.motion.translation_mm, measured->covariance_mm2 + floor, seconds);
-  } else if (s.filter.started()) {
-    s.filter.predict(seconds);
-  }
-  s.motion = measured ? *measured : RigidMotion{s.motion.translation_mm, s.motion.rotation_rad, Mat3::Zero(), 0};
-  if (detection) {
-    if (!s.filter.started() || s.rejected >= kMostRejected) {
-      s.filter.start(detection->tip_mm, detection->covariance_mm2);
-      s.rejected = 0;
-    } else {
-      s.rejected = s.filter.correct(detection->tip_mm, detection->covariance_mm2) ? 0 : s.rejected + 1;
-    }
-  }
+  s.advance(measured, followed, detection, seconds);
   s.visible = true;
 
   if (left.tip) s.last_left_tip = left.tip;
@@ -275,7 +309,12 @@ TipObservation TipTracker::update(const RectifiedPair& pair) {
                                              left_pixel(s.rectification, s.keyframe->tip_mm + s.motion.translation_mm))
                                   : 0;
   const bool stale = !s.keyframe || s.motion.agreement < kGoodAgreement || travelled_px > kKeyframeReach_px;
-  if (stale && detection && s.rejected == 0 && !s.marked) s.take_keyframe(std::move(*detection), right);
+  if (detection && s.rejected == 0) {
+    s.fresh_keyframe = make_keyframe(std::move(*detection), right);
+    if (stale && !s.marked) s.use_fresh_keyframe();
+  } else {
+    s.fresh_keyframe.reset();
+  }
 
   const Mat3 left_from_rectified = s.rectification.rectified_from_left.transpose();
   observation.visible = true;
@@ -294,7 +333,9 @@ void TipTracker::mark() {
   if (!s.visible) return;
   s.tip_at_mark_mm = s.filter.position_mm();
   s.covariance_at_mark_mm2 = s.filter.position_covariance_mm2();
-  if (s.keyframe && !s.track) s.motion_at_mark = s.motion;
+  if (s.track) return;
+  if (s.fresh_keyframe) s.use_fresh_keyframe();
+  if (s.keyframe) s.motion_at_mark = s.motion;
 }
 
 void TipTracker::unmark() {
