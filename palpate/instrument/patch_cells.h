@@ -10,7 +10,7 @@
 namespace palpate {
 
 /// Part of one eye's image, smoothed, ready to be aligned: brightness follows the texture inside the instrument, and
-/// metalness its outline, whatever the background does behind it. Two pyramid levels; float, grey levels 0..255.
+/// metalness its outline, whatever the background does behind it. Three pyramid levels; float, grey levels 0..255.
 struct ImageLayers {
   static constexpr int kLevels = 3;
   cv::Rect region;  ///< of the full image
