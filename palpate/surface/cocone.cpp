@@ -118,6 +118,8 @@ Neighbours find_neighbours(const Delaunay& delaunay, const std::vector<Vec3>& po
     result.of[a].push_back(static_cast<int>(b));
     result.of[b].push_back(static_cast<int>(a));
   });
+  // CGAL walks its edges in the order of their addresses, which differ from run to run.
+  for (std::vector<int>& neighbours : result.of) std::sort(neighbours.begin(), neighbours.end());
   return result;
 }
 
