@@ -21,7 +21,7 @@ struct ColourBar {
   double least = 0;
   double most = 1;
   std::string title;  ///< above the bar, with unit
-  std::string note;   ///< below the bar, may be empty
+  std::string note{};  ///< below the bar, may be empty
 };
 
 /// Vertical colour bar on a dark veil in `area` of a BGR image: title above, ticks with round numbers at its right.

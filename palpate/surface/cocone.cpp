@@ -165,9 +165,6 @@ std::vector<Triangle> candidate_triangles(const Delaunay& delaunay, const std::v
     }
     if (is_candidate) candidates.push_back(t);
   }
-  // The order of facets inside the triangulation is its own affair.
-  for (Triangle& t : candidates) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-  std::sort(candidates.begin(), candidates.end());
   return candidates;
 }
 

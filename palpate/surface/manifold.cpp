@@ -233,6 +233,9 @@ std::vector<Triangle> extract_manifold(const std::vector<Vec3>& points_mm, const
     if (cosine > 0) std::swap(t[1], t[2]);
     facing.push_back(t);
   }
+  // The order and turn of facets inside CGAL's triangulation follow addresses, which differ from run to run.
+  for (Triangle& t : facing) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  std::sort(facing.begin(), facing.end());
   Walk walk(points_mm, std::move(facing));
   walk.prune();
   std::vector<Triangle> triangles = walk.components();

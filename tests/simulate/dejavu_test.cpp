@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <opencv2/imgproc.hpp>
@@ -55,7 +56,7 @@ std::vector<Row> read_truth(const std::filesystem::path& file) {
 class DejaVu : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder = std::filesystem::path(::testing::TempDir()) / "palpate_dejavu";
+    folder = std::filesystem::path(::testing::TempDir()) / ("palpate_dejavu_" + std::to_string(getpid()));
     std::filesystem::remove_all(folder);
     const SimulatedCase demo = small_case();
     summary = simulate_dejavu(demo.simulate, demo.tissue, demo.attachments, demo.contact, folder,
@@ -160,7 +161,7 @@ TEST_F(DejaVu, OutlineCoversTheOrganInTheFirstPicture) {
 TEST(DejaVuSettings, RefuseAGestureThatMissesTheOrganAndWriteNothing) {
   SimulatedCase demo = small_case();
   demo.simulate.gesture[0].at_px = {5, 5};
-  const auto folder = std::filesystem::path(::testing::TempDir()) / "palpate_dejavu_missed";
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("palpate_dejavu_missed_" + std::to_string(getpid()));
   EXPECT_THROW(simulate_dejavu(demo.simulate, demo.tissue, demo.attachments, demo.contact, folder), BadInput);
   EXPECT_FALSE(std::filesystem::exists(folder));
 }
