@@ -14,6 +14,9 @@ constexpr int kMostHalvings = 12;
 constexpr int kMostSubdivisions = 5;
 /// A step that leaves more than this share of the residual calls for a new factorisation.
 constexpr double kSlowShare = 0.4;
+/// rho over the mean diagonal of K at rest. With 1, A is indefinite in equilibria of a deep push whose K is positive
+/// definite along the constraint, and Newton falls back to the slow projected tangent there; from 10 on it is not.
+constexpr double kConstraintWeight = 100;
 
 struct NewtonStep {
   Eigen::VectorXd du;      // on the unknowns
@@ -28,7 +31,7 @@ class BorderedSystem {
   BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J) : J_(J) {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * model.node_count());
     model.tangent(rest, false, K_);
-    rho_ = K_.diagonal().mean();
+    rho_ = kConstraintWeight * K_.diagonal().mean();
     const Eigen::SparseMatrix<double> full = rho_ * (J.transpose() * J);
     JtJ_ = full.triangularView<Eigen::Lower>();
     A_ = K_ + JtJ_;
