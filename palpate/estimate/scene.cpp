@@ -29,4 +29,15 @@ void describe(Settings& settings, Scene& scene) {
                  [&scene](Settings& group) { describe(group, scene.contact); });
 }
 
+Scene read_scene(const std::filesystem::path& file) {
+  Scene scene;
+  Settings settings;
+  settings.group("recording", "the two videos and their calibration",
+                 [&scene](Settings& group) { describe(group, scene.recording); });
+  settings.require("recording");
+  describe(settings, scene);
+  read_settings_file(file, settings);
+  return scene;
+}
+
 }  // namespace palpate

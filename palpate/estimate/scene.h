@@ -23,4 +23,7 @@ struct Scene {
 /// Binds every part but `recording`, which a scene that is to be simulated does not have.
 void describe(Settings& settings, Scene& scene);
 
+/// A scene with its recording, and nothing of what only the program knows (overlay, simulate). Throws BadInput.
+Scene read_scene(const std::filesystem::path& file);
+
 }  // namespace palpate

@@ -12,7 +12,8 @@ struct Outcome {
   std::string error;   ///< standard error
 };
 
-/// Runs the program with these arguments (a shell line).
+/// Runs a program with these arguments (a shell line).
+Outcome run(const std::string& program, const std::string& arguments);
 Outcome run_palpate(const std::string& arguments);
 
 /// A folder of its own for one test, removed at the end.

@@ -118,6 +118,16 @@ TEST(Program, CompareAnswersInJson) {
   EXPECT_NEAR(json["tip_rmse_mm"].get<double>(), 1, 1e-9);
 }
 
+TEST(Readme, ItsExampleIsTheOneThatIsCompiledAndItRuns) {
+  const std::filesystem::path source = PALPATE_SOURCE_DIR;
+  EXPECT_THAT(read_file(source / "README.md"), HasSubstr(read_file(source / "examples/forces.cpp")));
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 4);
+  const Outcome outcome = run(PALPATE_EXAMPLE_FORCES, (workspace / "in/scene.yaml").string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.error;
+  EXPECT_EQ(outcome.output, "1 tool_lost 0.000 N\n2 tool_lost 0.000 N\n3 tool_lost 0.000 N\n");
+}
+
 TEST(Program, TheScenePageIsWhatTheProgramSaysOfItself) {
   const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/scene.md");
   const Outcome outcome = run_palpate("--document-scene");
