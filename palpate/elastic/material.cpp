@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -63,10 +64,6 @@ const std::vector<std::pair<std::string, Law>>& law_words() {
   return kWords;
 }
 
-double kappa_of(const Lame& lame) {
-  return lame.lambda + 2.0 / 3.0 * lame.mu;
-}
-
 Mat9 saint_venant_kirchhoff_derivative(const Lame& lame, const Mat3& F) {
   const Mat3 E = 0.5 * (F.transpose() * F - Mat3::Identity());
   const Mat3 S = lame.lambda * E.trace() * Mat3::Identity() + 2 * lame.mu * E;
@@ -84,7 +81,7 @@ Mat9 saint_venant_kirchhoff_derivative(const Lame& lame, const Mat3& F) {
 Mat9 neo_hookean_derivative(const Lame& lame, const Mat3& F) {
   const double J = F.determinant();
   const Mat3 G = F.inverse().transpose();
-  const double I1 = F.squaredNorm(), kappa = kappa_of(lame);
+  const double I1 = F.squaredNorm(), kappa = bulk_modulus(lame);
   const double mu_j = lame.mu * std::pow(std::abs(J), -2.0 / 3.0);
   Mat9 C;
   for (int l = 0; l < 3; ++l)
@@ -127,7 +124,7 @@ double energy_density(Law law, const Lame& lame, const Mat3& F) {
   }
   const double J = F.determinant();
   if (J <= 0) return std::numeric_limits<double>::infinity();
-  return 0.5 * lame.mu * (std::pow(J, -2.0 / 3.0) * F.squaredNorm() - 3) + 0.5 * kappa_of(lame) * (J - 1) * (J - 1);
+  return 0.5 * lame.mu * (std::pow(J, -2.0 / 3.0) * F.squaredNorm() - 3) + 0.5 * bulk_modulus(lame) * (J - 1) * (J - 1);
 }
 
 Mat3 first_piola_stress(Law law, const Lame& lame, const Mat3& F) {
@@ -138,12 +135,45 @@ Mat3 first_piola_stress(Law law, const Lame& lame, const Mat3& F) {
   const double J = F.determinant();
   const Mat3 G = F.inverse().transpose();
   return lame.mu * std::pow(std::abs(J), -2.0 / 3.0) * (F - F.squaredNorm() / 3.0 * G) +
-         kappa_of(lame) * (J - 1) * J * G;
+         bulk_modulus(lame) * (J - 1) * J * G;
 }
 
 Mat9 stress_derivative(Law law, const Lame& lame, const Mat3& F) {
   return law == Law::saint_venant_kirchhoff ? saint_venant_kirchhoff_derivative(lame, F)
                                             : neo_hookean_derivative(lame, F);
+}
+
+double bulk_modulus(const Lame& lame) {
+  return lame.lambda + 2.0 / 3.0 * lame.mu;
+}
+
+Lame without_bulk(const Lame& lame) {
+  return {-2.0 / 3.0 * lame.mu, lame.mu};
+}
+
+double volume_ratio(Law law, const Mat3& F) {
+  return law == Law::saint_venant_kirchhoff ? 0.5 * (F.squaredNorm() - 1) : F.determinant();
+}
+
+Mat3 volume_ratio_gradient(Law law, const Mat3& F) {
+  if (law == Law::saint_venant_kirchhoff) return F;
+  Mat3 cofactor;
+  for (int j = 0; j < 3; ++j) cofactor.col(j) = F.col((j + 1) % 3).cross(F.col((j + 2) % 3));
+  return cofactor;
+}
+
+Mat9 volume_ratio_curvature(Law law, const Mat3& F) {
+  if (law == Law::saint_venant_kirchhoff) return Mat9::Identity();
+  // Block (j, l) is the matrix of the cross product with the third column, up to sign.
+  Mat9 C = Mat9::Zero();
+  for (int j = 0; j < 3; ++j) {
+    const int next = (j + 1) % 3, last = (j + 2) % 3;
+    Mat3 cross;
+    cross << 0, -F(2, last), F(1, last), F(2, last), 0, -F(0, last), -F(1, last), F(0, last), 0;
+    C.block<3, 3>(3 * j, 3 * next) = -cross;
+    C.block<3, 3>(3 * next, 3 * j) = cross;
+  }
+  return C;
 }
 
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F) {

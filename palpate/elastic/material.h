@@ -47,6 +47,16 @@ Mat3 first_piola_stress(Law law, const Lame& lame, const Mat3& F);
 /// dP/dF as a 9 x 9 matrix on column-major vec(F), MPa.
 Mat9 stress_derivative(Law law, const Lame& lame, const Mat3& F);
 
+/// Both laws hold the change of volume by kappa/2 (theta - 1)^2, where theta is J (neo-hookean) or 1 + tr(E), the same
+/// to first order (saint-venant-kirchhoff). What is left of a law without it is the law of `without_bulk(lame)`.
+double bulk_modulus(const Lame& lame);
+Lame without_bulk(const Lame& lame);
+double volume_ratio(Law law, const Mat3& F);
+/// d theta / dF.
+Mat3 volume_ratio_gradient(Law law, const Mat3& F);
+/// d^2 theta / dF^2 on column-major vec(F).
+Mat9 volume_ratio_curvature(Law law, const Mat3& F);
+
 /// P F^T / J, MPa.
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F);
 

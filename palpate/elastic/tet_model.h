@@ -9,11 +9,17 @@
 
 namespace palpate {
 
+/// How the energy of a change of volume is measured. Linear tetrahedra with a volume ratio each of their own lock in
+/// nearly incompressible tissue and overstate the force. Averaged over the elements around each node (energy-based, so
+/// the tangent stays symmetric, but couples nodes two edges apart), it no longer does.
+enum class Element { linear, averaged };
+
 /// Rest state of a body of linear tetrahedra: what does not change while it deforms. Displacements u are 3 n vectors
 /// (x y z of node 0, of node 1, ...), mm; forces likewise, N; stiffness N/mm.
 class TetModel {
  public:
-  TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::vector<int>& fixed_nodes);
+  TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::vector<int>& fixed_nodes,
+           Element element = Element::linear);
 
   int node_count() const { return static_cast<int>(rest_.size()); }
   int element_count() const { return static_cast<int>(tetrahedra_.size()); }
@@ -48,12 +54,28 @@ class TetModel {
   Eigen::VectorXd expand(const Eigen::VectorXd& reduced) const;
 
  private:
+  /// The elements around one node, a quarter of each: they share one volume ratio.
+  struct Star {
+    double volume_mm3 = 0;
+    std::vector<int> elements;
+    std::vector<int> free_nodes;   // ascending
+    std::vector<int> block_start;  // for each pair of them, columns first: the first entry of their block in K
+  };
+
+  void build_stars();
   void build_pattern();
+  /// kappa (theta - 1) of every star, MPa; empty for Element::linear.
+  Eigen::VectorXd star_pressure_MPa(const Eigen::VectorXd& u) const;
+  double element_pressure_MPa(const Eigen::VectorXd& star_pressure_MPa, size_t element) const;
+  void add_star_tangents(const Eigen::VectorXd& u, double* values) const;
+  void add_block(const Vec3& row, const Vec3& column, bool diagonal, int first_column, int start, double* values) const;
 
   std::vector<Vec3> rest_;
   std::vector<Tetrahedron> tetrahedra_;
   TissueOptions tissue_;
-  Lame lame_;
+  Lame lame_;                             // of what each element does by itself
+  double star_bulk_MPa_ = 0;              // kappa of the stars
+  std::vector<Star> stars_;               // one per node; empty for Element::linear
   std::vector<Mat3> inverse_rest_edges_;  // D_m^-1
   std::vector<double> rest_volume_mm3_;
   std::vector<int> first_unknown_;

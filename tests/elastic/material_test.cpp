@@ -61,6 +61,33 @@ TEST(Material, TangentIsTheDerivativeOfTheStressAndSymmetric) {
     }
 }
 
+TEST(Material, TheVolumeRatioAndItsDerivativesBelongTogether) {
+  std::mt19937 random(4);
+  for (Law law : kLaws)
+    for (int trial = 0; trial < 20; ++trial) {
+      const Mat3 F = random_gradient(random), G = volume_ratio_gradient(law, F);
+      const Mat9 C = volume_ratio_curvature(law, F);
+      for (int i = 0; i < 9; ++i) {
+        Mat3 plus = F, minus = F;
+        plus.data()[i] += 1e-5;
+        minus.data()[i] -= 1e-5;
+        EXPECT_NEAR((volume_ratio(law, plus) - volume_ratio(law, minus)) / 2e-5, G.data()[i], 1e-9);
+        const Mat3 slope = (volume_ratio_gradient(law, plus) - volume_ratio_gradient(law, minus)) / 2e-5;
+        EXPECT_LT((Eigen::Map<const Eigen::Matrix<double, 9, 1>>(slope.data()) - C.col(i)).norm(), 1e-9);
+      }
+    }
+}
+
+TEST(Material, TheBulkEnergyAndTheRestMakeTheWholeLaw) {
+  std::mt19937 random(5);
+  for (Law law : kLaws) {
+    const Mat3 F = random_gradient(random);
+    const double growth = volume_ratio(law, F) - 1;
+    EXPECT_NEAR(energy_density(law, without_bulk(liver()), F) + 0.5 * bulk_modulus(liver()) * growth * growth,
+                energy_density(law, liver(), F), 1e-15);
+  }
+}
+
 TEST(Material, ARotationCarriesTheStressAlong) {
   std::mt19937 random(3);
   const Mat3 R = Eigen::AngleAxisd(0.7, Vec3(1, 2, -1).normalized()).toRotationMatrix();

@@ -14,6 +14,10 @@ namespace palpate {
 namespace {
 
 const Law kLaws[] = {Law::saint_venant_kirchhoff, Law::neo_hookean};
+const std::pair<Law, Element> kCases[] = {{Law::saint_venant_kirchhoff, Element::linear},
+                                          {Law::neo_hookean, Element::linear},
+                                          {Law::saint_venant_kirchhoff, Element::averaged},
+                                          {Law::neo_hookean, Element::averaged}};
 
 TissueOptions tissue_of(Law law) {
   return {law, 27, 0.45, ""};
@@ -36,8 +40,8 @@ Eigen::VectorXd displacement_of(const TetMesh& mesh, const Mat3& F, const Vec3& 
 
 TEST(TetModel, ForcesAreTheGradientOfTheEnergy) {
   const TetMesh mesh = test::box_mesh({10, 10, 10}, {2, 2, 2});
-  for (Law law : kLaws) {
-    const TetModel model(mesh, tissue_of(law), {});
+  for (const auto& [law, element] : kCases) {
+    const TetModel model(mesh, tissue_of(law), {}, element);
     const Eigen::VectorXd u = random_displacement(model, 0.4, 5);
     const Eigen::VectorXd force = model.internal_force(u);
     for (int i = 0; i < u.size(); i += 7) {
@@ -51,8 +55,8 @@ TEST(TetModel, ForcesAreTheGradientOfTheEnergy) {
 
 TEST(TetModel, TheTangentIsTheDerivativeOfTheForcesOnTheUnknowns) {
   const TetMesh mesh = test::box_mesh({10, 10, 10}, {2, 2, 2});
-  for (Law law : kLaws) {
-    const TetModel model(mesh, tissue_of(law), test::nodes_at(mesh, 2, 0));
+  for (const auto& [law, element] : kCases) {
+    const TetModel model(mesh, tissue_of(law), test::nodes_at(mesh, 2, 0), element);
     const Eigen::VectorXd u = model.expand(model.reduce(random_displacement(model, 0.4, 6)));
     Eigen::SparseMatrix<double> lower;
     model.tangent(u, false, lower);
@@ -70,8 +74,8 @@ TEST(TetModel, TheTangentIsTheDerivativeOfTheForcesOnTheUnknowns) {
 TEST(TetModel, ARigidMotionGivesNoForceAndNoStress) {
   const TetMesh mesh = test::box_mesh({10, 8, 6}, {2, 2, 2});
   const Mat3 R = Eigen::AngleAxisd(2.1, Vec3(1, -1, 0.5).normalized()).toRotationMatrix();
-  for (Law law : kLaws) {
-    const TetModel model(mesh, tissue_of(law), {});
+  for (const auto& [law, element] : kCases) {
+    const TetModel model(mesh, tissue_of(law), {}, element);
     const Eigen::VectorXd u = displacement_of(mesh, R, {30, -10, 4});
     EXPECT_LT(model.internal_force(u).norm(), 1e-12);
     for (double stress : element_von_mises_kPa(model, u)) EXPECT_LT(stress, 1e-9);
@@ -84,11 +88,52 @@ TEST(TetModel, ThePatchTestHolds) {
   for (const Triangle& t : boundary_triangles(mesh)) surface_nodes.insert(surface_nodes.end(), t.begin(), t.end());
   Mat3 F;
   F << 1.1, 0.05, 0, -0.03, 0.95, 0.02, 0.01, 0, 1.04;
-  for (Law law : kLaws) {
-    const TetModel model(mesh, tissue_of(law), surface_nodes);
+  for (const auto& [law, element] : kCases) {
+    const TetModel model(mesh, tissue_of(law), surface_nodes, element);
     const Eigen::VectorXd force = model.internal_force(displacement_of(mesh, F, {1, 2, 3}));
     EXPECT_GT(model.unknown_count(), 0);
     EXPECT_LT(model.reduce(force).norm(), 1e-12 * force.norm());
+  }
+}
+
+TEST(TetModel, AHomogeneousDeformationHasTheSameEnergyHoweverItsVolumeRatioIsMeasured) {
+  const TetMesh mesh = test::box_mesh({10, 8, 6}, {3, 3, 3});
+  Mat3 F;
+  F << 1.1, 0.05, 0, -0.03, 0.8, 0.02, 0.01, 0, 1.04;
+  const Eigen::VectorXd u = displacement_of(mesh, F, {1, 2, 3});
+  for (Law law : kLaws) {
+    const double expected = 10 * 8 * 6 * energy_density(law, lame_of(tissue_of(law)), F);
+    EXPECT_NEAR(TetModel(mesh, tissue_of(law), {}, Element::linear).energy(u), expected, 1e-12 * expected);
+    EXPECT_NEAR(TetModel(mesh, tissue_of(law), {}, Element::averaged).energy(u), expected, 1e-12 * expected);
+  }
+}
+
+/// Tip deflection of a cantilever 40 x 10 x 10 under an end force, as a share of beam theory's.
+double share_of_the_beams_deflection(Law law, double poisson_ratio, Element element) {
+  const TetMesh mesh = test::box_mesh({40, 10, 10}, {16, 4, 4});
+  const double E_MPa = 0.027, force_N = 1e-5;
+  const TetModel model(mesh, {law, 1e3 * E_MPa, poisson_ratio, ""}, test::nodes_at(mesh, 0, 0), element);
+  Eigen::SparseMatrix<double> K;
+  model.tangent(Eigen::VectorXd::Zero(3 * model.node_count()), false, K);
+  SparseFactor factor;
+  factor.analyze(K);
+  EXPECT_TRUE(factor.factorize(K));
+  const std::vector<int> end = test::nodes_at(mesh, 0, 40);
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * model.node_count());
+  for (int node : end) load[3 * node + 2] = force_N / static_cast<double>(end.size());
+  const Eigen::VectorXd u = model.expand(factor.solve(model.reduce(load)));
+  double deflection = 0;
+  for (int node : end) deflection += u[3 * node + 2] / static_cast<double>(end.size());
+  const double inertia = 1e4 / 12, shear_modulus = E_MPa / (2 * (1 + poisson_ratio));
+  const double bending = force_N * 64000 / (3 * E_MPa * inertia), shear = 1.2 * force_N * 40 / (shear_modulus * 100);
+  return deflection / (bending + shear);
+}
+
+TEST(TetModel, AveragingTheVolumeRatioUnlocksNearlyIncompressibleBending) {
+  for (Law law : kLaws) {
+    EXPECT_LT(share_of_the_beams_deflection(law, 0.499, Element::linear), 0.5);
+    EXPECT_NEAR(share_of_the_beams_deflection(law, 0.499, Element::averaged), 1, 0.25);
+    EXPECT_NEAR(share_of_the_beams_deflection(law, 0.3, Element::averaged), 1, 0.2);
   }
 }
 
