@@ -20,7 +20,7 @@ cv::Vec3b colour_at(const ColourTable& table, double share);
 struct ColourBar {
   double least = 0;
   double most = 1;
-  std::string title;  ///< above the bar, with unit
+  std::string title;   ///< above the bar, with unit
   std::string note{};  ///< below the bar, may be empty
 };
 

@@ -161,7 +161,8 @@ TEST_F(DejaVu, OutlineCoversTheOrganInTheFirstPicture) {
 TEST(DejaVuSettings, RefuseAGestureThatMissesTheOrganAndWriteNothing) {
   SimulatedCase demo = small_case();
   demo.simulate.gesture[0].at_px = {5, 5};
-  const auto folder = std::filesystem::path(::testing::TempDir()) / ("palpate_dejavu_missed_" + std::to_string(getpid()));
+  const auto folder =
+      std::filesystem::path(::testing::TempDir()) / ("palpate_dejavu_missed_" + std::to_string(getpid()));
   EXPECT_THROW(simulate_dejavu(demo.simulate, demo.tissue, demo.attachments, demo.contact, folder), BadInput);
   EXPECT_FALSE(std::filesystem::exists(folder));
 }
