@@ -38,14 +38,10 @@ double percentile(std::vector<double> values, double share) {
   return values[static_cast<size_t>(std::round(share * static_cast<double>(values.size() - 1)))];
 }
 
-std::string run_yaml(const SceneFile& scene_file, const Rectification& rectification) {
-  const Mat3& R = rectification.rectified_from_left;
-  std::string text =
-      fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
-  text += "# axes of the rectified pair in the left camera frame, row by row\n";
-  text += fmt::format("# rectified_from_left: [[{}, {}, {}], [{}, {}, {}], [{}, {}, {}]]\n", R(0, 0), R(0, 1), R(0, 2),
-                      R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
-  return text;
+std::string run_yaml(SceneFile scene_file, const Rectification& rectification) {
+  scene_file.has_run = true;
+  scene_file.rectified_from_left = rectification.rectified_from_left;
+  return fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
 }
 
 /// The frames worth a picture in the report: spread over the contact, or over the run where there is none.

@@ -17,6 +17,13 @@ void describe(Settings& settings, SceneFile& scene_file) {
   settings.group(
       "simulate", "what DejaVu makes (palpate simulate)",
       [&scene_file](Settings& group) { palpate::describe(group, scene_file.simulate); }, &scene_file.has_simulate);
+  settings.group(
+      "run", "what a run found, written into run.yaml; without effect when read",
+      [&scene_file](Settings& group) {
+        group.matrix3("rectified_from_left", scene_file.rectified_from_left,
+                      "axes of the rectified pair in the left camera frame, row by row");
+      },
+      &scene_file.has_run);
 }
 
 SceneFile read_scene_file(const std::filesystem::path& file, bool needs_recording) {

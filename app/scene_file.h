@@ -15,8 +15,10 @@ struct SceneFile {
   Scene scene;
   OverlayOptions overlay;
   SimulateOptions simulate;
+  Mat3 rectified_from_left = Mat3::Identity();  ///< what a run found; written into run.yaml, without effect when read
   bool has_recording = false;
   bool has_simulate = false;
+  bool has_run = false;
 };
 
 void describe(Settings& settings, SceneFile& scene_file);

@@ -124,7 +124,8 @@ struct ForceEstimator::State {
     estimate.residual = equilibrium.residual;
     estimate.status = FrameStatus::not_converged;
     if (held->near_attachment()) estimate.warnings.push_back("near_attachment");
-    if (equilibrium.smallest_volume_ratio < kLeastVolumeRatio) estimate.warnings.push_back("law_out_of_range");
+    if (map.tissue.law == Law::saint_venant_kirchhoff && equilibrium.smallest_volume_ratio < kLeastVolumeRatio)
+      estimate.warnings.push_back("law_out_of_range");
     // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
     if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
     if (!equilibrium.converged) return;

@@ -118,6 +118,21 @@ TEST(Program, CompareAnswersInJson) {
   EXPECT_NEAR(json["tip_rmse_mm"].get<double>(), 1, 1e-9);
 }
 
+TEST(Program, TheDemoMeetsItsGoals) {
+  const Workspace workspace;
+  const Outcome outcome = run_palpate("demo -o " + (workspace / "demo").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_GE(json["frames"].get<int>(), 100);
+  const auto& figures = json["comparison"];
+  EXPECT_EQ(figures["missing_frames"].get<int>(), 0);
+  EXPECT_LE(figures["force_nrmse_pct"].get<double>(), 25);
+  EXPECT_LE(std::abs(figures["onset_error_frames"].get<int>()), 5);
+  EXPECT_LE(figures["tip_rmse_mm"].get<double>(), 2);
+  for (const char* name : {"forces.csv", "overlay.mp4", "map.vtu", "surface.ply", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(workspace / "demo" / name)) << name;
+}
+
 TEST(Readme, ItsExampleIsTheOneThatIsCompiledAndItRuns) {
   const std::filesystem::path source = PALPATE_SOURCE_DIR;
   EXPECT_THAT(read_file(source / "README.md"), HasSubstr(read_file(source / "examples/forces.cpp")));
