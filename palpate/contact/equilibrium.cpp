@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 namespace palpate {
 
@@ -12,8 +11,15 @@ namespace {
 
 constexpr int kMostHalvings = 12;
 constexpr int kMostSubdivisions = 5;
-/// A step that leaves more than this share of the residual calls for a new factorisation.
+/// A step with the factor of an earlier state that leaves more than this share of the residual calls for a true one.
 constexpr double kSlowShare = 0.4;
+/// Conjugate gradients stop at such a share of the residual (in the norm of the preconditioner) or after so many steps.
+constexpr double kLeastGradientShare = 0.03, kMostGradientShare = 0.3;
+constexpr int kMostGradients = 40;
+/// Steps of conjugate gradients on one factor that have cost more than a new one.
+constexpr int kStaleGradients = 80;
+/// What a new factor and a new tangent cost, in solves.
+constexpr int kFactorCost = 40, kTangentCost = 4;
 /// rho over the mean diagonal of K at rest. With 1, A is indefinite in equilibria of a deep push whose K is positive
 /// definite along the constraint, and Newton falls back to the slow projected tangent there; from 10 on it is not.
 constexpr double kConstraintWeight = 100;
@@ -23,7 +29,7 @@ struct NewtonStep {
   Eigen::VectorXd lambda;  // new multipliers
 };
 
-/// Eq. 3 by Schur complement on the factored stiffness A = K + rho J^T J, on one fixed pattern:
+/// Eq. 3 by Schur complement on a factored stiffness A = K + rho J^T J of some earlier state, on one fixed pattern:
 ///   A du + J^T lambda = -f_int + rho J^T g,  J du = g.
 /// The same solution as with K, but A is positive definite also where the tissue under the tip softens in compression.
 class BorderedSystem {
@@ -41,6 +47,7 @@ class BorderedSystem {
   /// False when even the projected tangent cannot be factored.
   bool factorize(const TetModel& model, const Eigen::VectorXd& u) {
     usable_ = false;
+    gradients_ = 0;
     for (bool project : {false, true}) {
       model.tangent(u, project, K_);
       A_ = K_ + JtJ_;
@@ -54,14 +61,54 @@ class BorderedSystem {
   }
 
   bool usable() const { return usable_; }
+  bool stale() const { return gradients_ > kStaleGradients; }
   double rho() const { return rho_; }
 
-  std::optional<NewtonStep> solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
+  /// With the factored state's stiffness.
+  NewtonStep solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
     const Eigen::VectorXd a = factor_.solve(Eigen::VectorXd(-f_int + rho_ * (J_.transpose() * g)));
     NewtonStep step;
     step.lambda = schur_.solve(J_ * a - g);
     step.du = a - Y_ * step.lambda;
-    if (!step.du.allFinite() || !step.lambda.allFinite()) return std::nullopt;
+    return step;
+  }
+
+  /// With the stiffness at `u`: conjugate gradients within J du = g, preconditioned by `solve` (Gould, Hribar, Nocedal
+  /// 2001), until the residual has fallen to `share`. Where the stiffness is not positive the step ends; with g = 0 it
+  /// is still one of descent.
+  NewtonStep solve_at(const TetModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& f_int,
+                      const Eigen::VectorXd& g, bool constrained, double share, int& solves) {
+    model.tangent(u, false, K_);
+    const Eigen::VectorXd still = Eigen::VectorXd::Zero(J_.rows());
+    Eigen::VectorXd residual = f_int, du = Eigen::VectorXd::Zero(f_int.size());
+    if (!constrained) {
+      du = solve(f_int, g).du;
+      residual += K_.selfadjointView<Eigen::Lower>() * du;
+    }
+    NewtonStep step = solve(residual, still);
+    Eigen::VectorXd along = step.du;
+    step.du = du;
+    double slope = -residual.dot(along);
+    const double enough = share * share * slope;
+    int gradients = constrained ? 1 : 2;
+    for (; gradients < kMostGradients && slope > enough; ++gradients) {
+      const Eigen::VectorXd K_along = K_.selfadjointView<Eigen::Lower>() * along;
+      const double curvature = along.dot(K_along);
+      if (curvature <= 0) {
+        if (gradients == 1) step.du = along;
+        break;
+      }
+      const double length = slope / curvature;
+      step.du += length * along;
+      residual += length * K_along;
+      const NewtonStep correction = solve(residual, still);
+      step.lambda = correction.lambda;
+      const double last_slope = slope;
+      slope = -residual.dot(correction.du);
+      along = correction.du + slope / last_slope * along;
+    }
+    gradients_ += gradients;
+    solves += gradients + kTangentCost;
     return step;
   }
 
@@ -71,6 +118,7 @@ class BorderedSystem {
   Eigen::MatrixXd Y_;  // A^-1 J^T
   Eigen::LDLT<Eigen::MatrixXd> schur_;
   double rho_ = 0;
+  int gradients_ = 0;  // since the last factorisation
   bool usable_ = false;
 };
 
@@ -93,77 +141,114 @@ struct EquilibriumSolver::State {
   Vec3 displacement_mm = Vec3::Zero();
   int iterations_left = 0;
 
+  int solves_left = 0;
+  bool balanced = true;  // u is an equilibrium, not just where the solves ran out
+
   struct Reached {
     bool converged = false;
     double residual = 0;
   };
 
+  /// A point on the way, and how far from balance it is.
+  struct Trial {
+    Eigen::VectorXd u, lambda;  // on the unknowns; multipliers
+    Eigen::VectorXd full, f_int, g;
+    double residual = 0;
+    bool constrained = false;
+  };
+
   State(const TetModel& m, const EquilibriumOptions& o) : model(m), options(o) {}
 
   double energy(const Eigen::VectorXd& reduced) const { return model.energy(model.expand(reduced)); }
+  bool exhausted() const { return iterations_left <= 0 || solves_left <= 0; }
 
-  /// Newton towards J u = p for one step of the displacement; on failure the state is left as it was.
+  void weigh(Trial& trial, const Eigen::VectorXd& target) const {
+    trial.full = model.expand(trial.u);
+    trial.f_int = model.reduce(model.internal_force(trial.full));
+    trial.g = target - J * trial.u;
+    const Eigen::VectorXd contact = J.transpose() * trial.lambda;
+    trial.residual = largest_nodal_norm(trial.f_int + contact) /
+                     std::max(largest_nodal_norm(contact), 1e-9 * system->rho() / kConstraintWeight);
+    trial.constrained = trial.g.size() == 0 || trial.g.lpNorm<Eigen::Infinity>() < 1e-9;
+  }
+
+  void keep(const Trial& trial, const Vec3& p) {
+    u = trial.u;
+    lambda = trial.lambda;
+    displacement_mm = p;
+  }
+
+  /// Newton towards J u = p for one step of the displacement. A failure leaves the state as it was; running out of
+  /// solves leaves it where it has come.
   Reached newton(const Vec3& p) {
     const Eigen::VectorXd target = p.replicate(J.rows() / 3, 1);
-    Eigen::VectorXd trial = u, multipliers = lambda;
-    Reached reached;
-    // The factor of an earlier state serves as long as it makes the true residual fall quickly.
-    bool fresh = false, refactor = !system->usable();
+    Trial trial{u, lambda, {}, {}, {}, 0, false};
+    weigh(trial, target);
+    if (!system->usable() || system->stale()) {
+      solves_left -= kFactorCost;
+      if (!system->factorize(model, trial.full)) return {false, trial.residual};
+    }
     double last_residual = std::numeric_limits<double>::infinity();
+    bool slow = false;  // the old factor alone no longer serves
     for (;;) {
-      const Eigen::VectorXd full = model.expand(trial);
-      const Eigen::VectorXd f_int = model.reduce(model.internal_force(full));
-      const Eigen::VectorXd g = target - J * trial;
-      const Eigen::VectorXd contact = J.transpose() * multipliers;
-      const double scale = std::max(largest_nodal_norm(contact), 1e-9 * system->rho());
-      reached.residual = largest_nodal_norm(f_int + contact) / scale;
-      const bool constrained = g.size() == 0 || g.lpNorm<Eigen::Infinity>() < 1e-9;
-      if (constrained && reached.residual <= options.relative_residual) {
-        reached.converged = true;
-        u = trial;
-        lambda = multipliers;
-        displacement_mm = p;
-        return reached;
+      if (trial.constrained && (trial.residual <= options.relative_residual || exhausted())) {
+        keep(trial, p);
+        balanced = trial.residual <= options.relative_residual;
+        return {balanced, trial.residual};
       }
-      if (iterations_left == 0) return reached;
+      if (exhausted()) return {false, trial.residual};
       --iterations_left;
-      if (constrained && reached.residual > kSlowShare * last_residual) refactor = true;
-      if (constrained) last_residual = reached.residual;
-      if (refactor) {
-        if (!system->factorize(model, full)) return reached;
-        fresh = true;
-        refactor = false;
-      } else {
-        fresh = false;
+      if (trial.constrained) {
+        slow = slow || trial.residual > kSlowShare * last_residual;
+        last_residual = trial.residual;
       }
-      const auto step = system->solve(f_int, g);
-      const auto length = step ? step_length(trial, step->du, f_int, constrained) : std::nullopt;
-      if (!length) {
-        if (fresh) return reached;
-        refactor = true;
-        continue;
-      }
-      trial += *length * step->du;
-      multipliers += *length * (step->lambda - multipliers);
+      if (advance(trial, target, slow)) continue;
+      if (slow) return {false, trial.residual};
+      slow = true;
     }
   }
 
-  /// Full steps move the constraint; afterwards the energy has to fall (Armijo).
-  std::optional<double> step_length(const Eigen::VectorXd& from, const Eigen::VectorXd& du,
-                                    const Eigen::VectorXd& f_int, bool constrained) const {
-    if (!constrained) return std::isfinite(energy(from + du)) ? std::optional<double>(1.0) : std::nullopt;
-    const double before = energy(from), slope = f_int.dot(du);
-    // Near the solution energies differ by rounding only.
-    const double rounding = 1e-12 * std::abs(before) + 1e-18;
+  /// One step, with the stiffness of the moment or that of the factor; false when it would lead nowhere.
+  bool advance(Trial& trial, const Eigen::VectorXd& target, bool with_tangent) {
+    int solves = 1;
+    // As exact as the distance from balance asks for.
+    const double share = std::max(std::clamp(trial.residual, kLeastGradientShare, kMostGradientShare),
+                                  0.1 * options.relative_residual / trial.residual);
+    const NewtonStep step =
+        with_tangent ? system->solve_at(model, trial.full, trial.f_int, trial.g, trial.constrained, share, solves)
+                     : system->solve(trial.f_int, trial.g);
+    solves_left -= solves;
+    if (!step.du.allFinite() || !step.lambda.allFinite()) return false;
+    const auto at = [&](double length) {
+      Trial next{
+          trial.u + length * step.du, trial.lambda + length * (step.lambda - trial.lambda), {}, {}, {}, 0, false};
+      weigh(next, target);
+      return next;
+    };
+    if (!trial.constrained) {
+      if (!std::isfinite(energy(trial.u + step.du))) return false;
+      trial = at(1);
+      return true;
+    }
+    // Along the constraint the energy has to fall (Armijo). Near the solution rounding hides that; the residual tells.
+    const double before = energy(trial.u), slope = trial.f_int.dot(step.du);
     double length = 1;
-    for (int halving = 0; halving < kMostHalvings; ++halving, length *= 0.5)
-      if (energy(from + length * du) <= before + 1e-4 * length * std::min(slope, 0.0) + rounding) return length;
-    return std::nullopt;
+    for (int halving = 0; halving < kMostHalvings; ++halving, length *= 0.5) {
+      const double after = energy(trial.u + length * step.du);
+      if (!std::isfinite(after)) continue;
+      const bool falls = after <= before + 1e-4 * length * std::min(slope, 0.0);
+      if (!falls && after > before + 1e-9 * std::abs(before)) continue;
+      Trial next = at(length);
+      if (!falls && next.residual > 0.5 * trial.residual) continue;
+      trial = std::move(next);
+      return true;
+    }
+    return false;
   }
 
   Reached move_to(const Vec3& p, int depth) {
-    Reached reached = newton(p);
-    if (reached.converged || depth >= kMostSubdivisions || iterations_left == 0) return reached;
+    const Reached reached = newton(p);
+    if (reached.converged || depth >= kMostSubdivisions || exhausted()) return reached;
     const Reached half = move_to(0.5 * (displacement_mm + p), depth + 1);
     return half.converged ? move_to(p, depth + 1) : half;
   }
@@ -204,6 +289,7 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
   s.lambda = Eigen::VectorXd::Zero(s.J.rows());
   s.displacement_mm.setZero();
+  s.balanced = true;
 }
 
 void EquilibriumSolver::release() {
@@ -224,6 +310,8 @@ Equilibrium EquilibriumSolver::solve(const Vec3& displacement_mm) {
   const Vec3 from = s.displacement_mm;
   const int parts =
       std::max(1, static_cast<int>(std::ceil((displacement_mm - from).norm() / s.options.longest_step_mm)));
+  s.solves_left = parts * s.options.most_solves;
+  if (!s.balanced) reached = s.newton(from);
   for (int part = 1; part <= parts && reached.converged; ++part)
     reached = s.move_to(from + (displacement_mm - from) * part / parts, 0);
   return s.answer(reached);

@@ -9,7 +9,10 @@ namespace palpate {
 struct EquilibriumOptions {
   double relative_residual = 1e-6;  ///< of the largest nodal force
   int most_iterations = 60;         ///< Newton steps of one call, all parts of the displacement together
-  double longest_step_mm = 2.0;     ///< prescribed displacement applied at once
+  /// Bound on the time of one call, counted in solves with the factor (a new factor counts as 40), for each longest
+  /// step of displacement.
+  int most_solves = 400;
+  double longest_step_mm = 2.0;  ///< prescribed displacement applied at once
 };
 
 /// Answer of Eq. 3, with everything needed to judge it.
@@ -36,8 +39,9 @@ class EquilibriumSolver {
   /// Ends it.
   void release();
 
-  /// Newton on Eq. 3 from the last state, with a factor that is renewed only when it no longer serves: K u + J^T lambda
-  /// = f, J u = p with the same p for every sample.
+  /// Newton on Eq. 3 from the last state: K u + J^T lambda = f, J u = p with the same p for every sample. The factor of
+  /// an earlier state serves as long as it makes the residual fall quickly, then as the preconditioner of conjugate
+  /// gradients. An answer that ran out of `most_solves` is where the next call goes on.
   Equilibrium solve(const Vec3& displacement_mm);
 
  private:

@@ -10,6 +10,8 @@ namespace {
 /// Slip corrections per frame: each brings the tangential force back to the cone, the next one mends the nonlinearity.
 constexpr int kSlipCorrections = 3;
 constexpr double kConeTolerance = 1.02;
+/// The force of a frame is wanted to a per mille; the tip is not known better.
+constexpr double kFrameResidual = 1e-4;
 }  // namespace
 
 struct HeldContact::State {
@@ -22,11 +24,11 @@ struct HeldContact::State {
   bool near_attachment = false;
 
   State(const TetMesh& mesh, const std::vector<int>& fixed, const TissueOptions& tissue, const Vec3& touch_mm,
-        const ContactOptions& o)
+        const ContactOptions& o, Element element)
       : boundary(boundary_triangles(mesh)),
-        model(mesh, tissue, fixed),
+        model(mesh, tissue, fixed, element),
         footprint(make_footprint(model, boundary, touch_mm, o.footprint_radius_mm)),
-        solver(model),
+        solver(model, EquilibriumOptions{.relative_residual = kFrameResidual}),
         options(o) {
     solver.hold(footprint);
     double nearest_mm = std::numeric_limits<double>::infinity();
@@ -59,8 +61,8 @@ struct HeldContact::State {
 };
 
 HeldContact::HeldContact(const TetMesh& mesh, const std::vector<int>& fixed_nodes, const TissueOptions& tissue,
-                         const Vec3& touch_mm, const ContactOptions& options)
-    : state_(std::make_unique<State>(mesh, fixed_nodes, tissue, touch_mm, options)) {}
+                         const Vec3& touch_mm, const ContactOptions& options, Element element)
+    : state_(std::make_unique<State>(mesh, fixed_nodes, tissue, touch_mm, options, element)) {}
 HeldContact::~HeldContact() = default;
 HeldContact::HeldContact(HeldContact&&) noexcept = default;
 

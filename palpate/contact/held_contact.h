@@ -13,7 +13,7 @@ class HeldContact {
  public:
   /// `touch_mm`: where the tip met the surface at rest. `fixed_nodes`: attachments of `mesh`.
   HeldContact(const TetMesh& mesh, const std::vector<int>& fixed_nodes, const TissueOptions& tissue,
-              const Vec3& touch_mm, const ContactOptions& options);
+              const Vec3& touch_mm, const ContactOptions& options, Element element = Element::averaged);
   ~HeldContact();
   HeldContact(HeldContact&&) noexcept;
 

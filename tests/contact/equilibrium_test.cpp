@@ -111,6 +111,38 @@ TEST(Equilibrium, DoesNotDependOnTheWayThere) {
   EXPECT_LT((a.force_N - b.force_N).norm(), 1e-5 * a.force_N.norm());
 }
 
+TEST(Equilibrium, StaysConvergedThroughADeepPushWithADrag) {
+  const Block block;
+  for (Element element : {Element::linear, Element::averaged}) {
+    const TetModel model(block.mesh, {Law::neo_hookean, 27, 0.45, ""}, test::nodes_at(block.mesh, 2, 20), element);
+    EquilibriumSolver solver(model);
+    solver.hold(make_footprint(model, block.boundary, {20, 20, 0}, 4));
+    for (int i = 1; i <= 30; ++i) {
+      const Vec3 p = i <= 15 ? Vec3(0, 0, 0.4 * i) : Vec3(0.3 * (i - 15), 0, 6);
+      const Equilibrium found = solver.solve(p);
+      ASSERT_TRUE(found.converged) << "at " << p.transpose();
+      EXPECT_GT(found.smallest_volume_ratio, 0);
+    }
+  }
+}
+
+TEST(Equilibrium, GoesOnWhereItRanOutOfSolves) {
+  const Block block;
+  const TetModel model = block.model_of(Law::neo_hookean, 27);
+  const Footprint footprint = make_footprint(model, block.boundary, {20, 20, 0}, 4);
+  EquilibriumSolver hurried(model, {.most_solves = 44}), patient(model);
+  hurried.hold(footprint);
+  patient.hold(footprint);
+  const Vec3 p(1.2, 0, 1.5);
+  Equilibrium found = hurried.solve(p);
+  EXPECT_FALSE(found.converged);
+  EXPECT_TRUE(found.u.allFinite());
+  for (int i = 0; i < 20 && !found.converged; ++i) found = hurried.solve(p);
+  ASSERT_TRUE(found.converged);
+  const Equilibrium direct = patient.solve(p);
+  EXPECT_LT((found.force_N - direct.force_N).norm(), 1e-5 * direct.force_N.norm());
+}
+
 TEST(Equilibrium, SaysSoWhereNoStateIsFound) {
   const Block block;
   const TetModel model = block.model_of(Law::saint_venant_kirchhoff, 27);
