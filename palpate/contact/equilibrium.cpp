@@ -20,6 +20,8 @@ constexpr int kMostGradients = 40;
 constexpr int kStaleGradients = 80;
 /// What a new factor and a new tangent cost, in solves.
 constexpr int kFactorCost = 40, kTangentCost = 4;
+/// A step is continued when the tip moves on within this cosine of its direction, and not farther than this.
+constexpr double kSameDirection = 0.9, kFarthestAhead = 2;
 /// rho over the mean diagonal of K at rest. With 1, A is indefinite in equilibria of a deep push whose K is positive
 /// definite along the constraint, and Newton falls back to the slow projected tangent there; from 10 on it is not.
 constexpr double kConstraintWeight = 100;
@@ -142,6 +144,8 @@ struct EquilibriumSolver::State {
   int iterations_left = 0;
 
   int solves_left = 0;
+  Eigen::VectorXd last_du, last_dlambda;  // the last step, by last_dp_mm
+  Vec3 last_dp_mm = Vec3::Zero();
   bool balanced = true;  // u is an equilibrium, not just where the solves ran out
 
   struct Reached {
@@ -172,7 +176,25 @@ struct EquilibriumSolver::State {
     trial.constrained = trial.g.size() == 0 || trial.g.lpNorm<Eigen::Infinity>() < 1e-9;
   }
 
+  /// Where the last step leads when the tip goes on in its direction, else the state as it is.
+  Trial begin(const Vec3& p, const Eigen::VectorXd& target) const {
+    Trial trial{u, lambda, {}, {}, {}, 0, false};
+    const Vec3 dp_mm = p - displacement_mm;
+    const double along = dp_mm.dot(last_dp_mm);
+    if (along > kSameDirection * dp_mm.norm() * last_dp_mm.norm()) {
+      const double share = along / last_dp_mm.squaredNorm();
+      const Eigen::VectorXd ahead = u + share * last_du;
+      if (share < kFarthestAhead && std::isfinite(energy(ahead)))
+        trial = {ahead, lambda + share * last_dlambda, {}, {}, {}, 0, false};
+    }
+    weigh(trial, target);
+    return trial;
+  }
+
   void keep(const Trial& trial, const Vec3& p) {
+    last_du = trial.u - u;
+    last_dlambda = trial.lambda - lambda;
+    last_dp_mm = p - displacement_mm;
     u = trial.u;
     lambda = trial.lambda;
     displacement_mm = p;
@@ -182,8 +204,7 @@ struct EquilibriumSolver::State {
   /// solves leaves it where it has come.
   Reached newton(const Vec3& p) {
     const Eigen::VectorXd target = p.replicate(J.rows() / 3, 1);
-    Trial trial{u, lambda, {}, {}, {}, 0, false};
-    weigh(trial, target);
+    Trial trial = begin(p, target);
     if (!system->usable() || system->stale()) {
       solves_left -= kFactorCost;
       if (!system->factorize(model, trial.full)) return {false, trial.residual};
@@ -289,6 +310,7 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
   s.lambda = Eigen::VectorXd::Zero(s.J.rows());
   s.displacement_mm.setZero();
+  s.last_dp_mm.setZero();
   s.balanced = true;
 }
 
