@@ -67,7 +67,7 @@ struct ForceEstimator::State {
         refine_near(map.mesh, gap.surface_point_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
     const std::vector<int> fixed = select_attachments(
         refined, attachments, [this](const Vec3& point) { return project_to_recorded_left(rectification.rig, point); });
-    held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options);
+    held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options, map.element);
     onset_tip_mm = tip.tip_mm;
     tracker.mark();
     tissue_motion.start(pair, tip.left_mask, gap.surface_point_mm,

@@ -13,6 +13,9 @@ void describe(Settings& settings, MapOptions& options) {
                 "instead of the thickness: the organ from a scan (.msh .vtk .vtu .obj .ply .stl), left camera frame");
   settings.choice<LengthUnit>("volume_unit", options.volume_unit, {{"mm", LengthUnit::mm}, {"m", LengthUnit::m}},
                               "unit of length of that file");
+  settings.choice<Element>(
+      "element", options.element, {{"averaged", Element::averaged}, {"linear", Element::linear}},
+      "averaged: the volume ratio averaged around each node, free of locking; linear: the paper's plain tetrahedra");
   describe(settings, options.match);
   describe(settings, options.surface);
 }

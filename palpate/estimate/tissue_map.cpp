@@ -46,6 +46,7 @@ TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectif
                            const TissueOptions& tissue, const AttachmentOptions& attachments) {
   TissueMap map;
   map.tissue = tissue;
+  map.element = options.element;
   map.frame = frame.index;
   Stopwatch watch;
   const RectifiedPair pair = rectify(rectification, frame);

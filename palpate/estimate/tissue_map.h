@@ -6,6 +6,7 @@
 #include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
 #include "palpate/elastic/material.h"
+#include "palpate/elastic/tet_model.h"
 #include "palpate/stereo/match.h"
 #include "palpate/stereo/rig.h"
 #include "palpate/surface/clean_points.h"
@@ -23,6 +24,7 @@ struct MapOptions {
   double thickness_mm = 25;
   std::filesystem::path volume;
   LengthUnit volume_unit = LengthUnit::mm;
+  Element element = Element::averaged;
   MatchOptions match;
   SurfaceOptions surface;
 };
@@ -46,6 +48,7 @@ struct TissueMap {
   TetMesh mesh;                  ///< V
   std::vector<int> fixed_nodes;  ///< b
   TissueOptions tissue;          ///< gamma
+  Element element = Element::averaged;
   DisparityMap disparity;
   cv::Mat organ_mask;  ///< 255 = organ region, rectified left image
   int frame = 0;       ///< the static frame
