@@ -131,7 +131,7 @@ struct Motion {
 
 Motion solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
                     const TouchPoint& touch, DejaVuSummary& summary, const std::function<void()>& step) {
-  const TetModel model(truth.mesh, tissue, truth.fixed_nodes);
+  const TetModel model(truth.mesh, tissue, truth.fixed_nodes, Element::averaged);
   EquilibriumOptions precise;
   precise.relative_residual = kTruthResidual;
   EquilibriumSolver solver(model, precise);
