@@ -1,5 +1,7 @@
 #include "palpate/elastic/stress.h"
 
+#include <Eigen/LU>
+
 namespace palpate {
 
 namespace {
@@ -18,11 +20,14 @@ std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::Ve
 std::vector<double> node_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u) {
   const std::vector<double> of_element = element_von_mises_kPa(model, u);
   std::vector<double> sum(static_cast<size_t>(model.node_count()), 0.0), weight = sum;
-  for (int e = 0; e < model.element_count(); ++e)
+  for (int e = 0; e < model.element_count(); ++e) {
+    const double volume_mm3 = model.deformation_gradient(u, e).determinant() * model.rest_volume_mm3(e);
+    if (volume_mm3 <= 0) continue;
     for (int node : model.tetrahedra()[static_cast<size_t>(e)]) {
-      sum[static_cast<size_t>(node)] += model.rest_volume_mm3(e) * of_element[static_cast<size_t>(e)];
-      weight[static_cast<size_t>(node)] += model.rest_volume_mm3(e);
+      sum[static_cast<size_t>(node)] += volume_mm3 * of_element[static_cast<size_t>(e)];
+      weight[static_cast<size_t>(node)] += volume_mm3;
     }
+  }
   for (size_t n = 0; n < sum.size(); ++n)
     if (weight[n] > 0) sum[n] /= weight[n];
   return sum;

@@ -7,7 +7,8 @@ namespace palpate {
 /// Von Mises of the Cauchy stress (Eq. 5), one per element, kPa.
 std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u);
 
-/// Mean over the elements around each node, weighted by their rest volume, kPa.
+/// Mean over the elements around each node, weighted by their deformed volume, kPa. Elements that are turned inside out
+/// have no Cauchy stress and are left out; 0 where there is no other.
 std::vector<double> node_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u);
 
 }  // namespace palpate

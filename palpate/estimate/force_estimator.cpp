@@ -48,6 +48,7 @@ struct ForceEstimator::State {
   std::optional<HeldContact> held;
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
+  std::optional<bool> was_closed;  // jaws of the free tip, where a tip track says so
   int lost_frames = 0;
 
   State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
@@ -85,8 +86,10 @@ struct ForceEstimator::State {
   void look_for_contact(const RectifiedPair& pair, const TipObservation& tip) {
     const Gap gap = gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary);
     const double deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
-    const bool touches = onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
-    if (touches && tip.closed.value_or(true)) begin_contact(pair, tip, gap);
+    const bool comes_to_rest = onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
+    const bool closes = tip.closed.value_or(false) && was_closed == false && gap.distance_mm < options.threshold_mm;
+    was_closed = tip.closed;
+    if (closes || (comes_to_rest && tip.closed.value_or(true))) begin_contact(pair, tip, gap);
   }
 
   /// u, lambda of Eq. 3 for the tip's displacement since onset; ends the contact when the image or the grip says so.
@@ -94,6 +97,7 @@ struct ForceEstimator::State {
                                            ForceEstimate& estimate) {
     if (tip.closed && !*tip.closed) {
       end_contact(tip.tip_mm);
+      was_closed = false;
       return std::nullopt;
     }
     const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);

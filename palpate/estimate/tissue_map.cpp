@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/core/stopwatch.h"
+#include "palpate/estimate/check_map.h"
 #include "palpate/instrument/segment.h"
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/triangulate.h"
@@ -69,12 +70,15 @@ TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectif
 
   const Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
                                               : read_body(options.volume, options.volume_unit);
+  if (!options.volume.empty())
+    require_body_where_seen(body, map.disparity, rectification, map.organ_mask, options.volume);
   map.mesh = tetrahedralize(body, options.elements, {}, &map.report.mesh);
   map.report.volume_ms = watch.lap_ms();
 
   map.fixed_nodes = select_attachments(map.mesh, attachments, [&rectification](const Vec3& point) {
     return project_to_recorded_left(rectification.rig, point);
   });
+  require_every_piece_held(map.mesh, map.fixed_nodes);
   map.report.attachments_ms = watch.lap_ms();
 
   map.report.matched_points = static_cast<int>(map.cloud.size());

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "palpate/feedback/compare.h"
 #include "palpate/palpate.h"
 #include "palpate/volume/body.h"
@@ -62,6 +64,26 @@ TEST(WholeChain, TheForceOnTheRenderedUterusFollowsTheTruth) {
   EXPECT_LE(std::abs(figures.release_error_frames.value()), 2);
   EXPECT_EQ(figures.false_contact_frames, 0);
   EXPECT_LT(figures.tip_rmse_mm.value(), 2);
+}
+
+TEST(WholeChain, JawsThatCloseOnTheTissueBeginTheContactAndJawsThatOpenEndIt) {
+  PALPATE_NEEDS_REFERENCE("rendered_uterus");
+  Sequence sequence(test::reference_data() / "rendered_uterus");
+  const auto truth = read_forces(test::reference_data() / "rendered_uterus" / "truth.csv");
+  sequence.scene.instrument.track = std::filesystem::path(testing::TempDir()) / "tip_with_jaws.csv";
+  std::ofstream track(sequence.scene.instrument.track);
+  track << "frame,time_s,x_mm,y_mm,z_mm,closed\n";
+  for (const ForceRow& row : truth)
+    track << row.frame << ',' << row.time_s << ',' << row.tip_mm.x() << ',' << row.tip_mm.y() << ',' << row.tip_mm.z()
+          << ',' << row.in_contact << '\n';
+  track.close();
+  ForceEstimator estimator = sequence.estimator();
+  std::vector<ForceRow> rows = {to_row(estimator.update(sequence.rest))};
+  while (const auto frame = sequence.recording.next()) rows.push_back(to_row(estimator.update(*frame)));
+  const Comparison figures = compare(rows, truth);
+  EXPECT_EQ(figures.onset_error_frames.value(), 0);
+  EXPECT_EQ(figures.release_error_frames.value(), 0);
+  EXPECT_LT(figures.force_nrmse_pct.value(), 10);
 }
 
 TEST(WholeChain, BadFramesAreAStatusAndTheContactIsFoundAgain) {
