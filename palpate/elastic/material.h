@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-enum class Law { saint_venant_kirchhoff, neo_hookean };
+enum class Law { saint_venant_kirchhoff, neo_hookean, corotated, linear };
 
 /// gamma of the paper. Inside, stress is N/mm^2 = MPa.
 struct TissueOptions {
@@ -39,6 +39,9 @@ Lame lame_of(const TissueOptions& tissue);
 ///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E
 ///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus,
 ///   CalculiX)
+///   corotated:              lambda/2 tr(S - I)^2 + mu |S - I|^2 with F = R S, R a rotation also where F is inverted
+///   (Mueller and Gross 2004; with tr(S - I)^2, not (J - 1)^2, so that it is Hooke's law in the turned frame)
+///   linear:                 lambda/2 tr(eps)^2 + mu eps:eps, eps = sym(F) - I
 double energy_density(Law law, const Lame& lame, const Mat3& F);
 
 /// First Piola-Kirchhoff stress dW/dF, MPa.
@@ -47,8 +50,8 @@ Mat3 first_piola_stress(Law law, const Lame& lame, const Mat3& F);
 /// dP/dF as a 9 x 9 matrix on column-major vec(F), MPa.
 Mat9 stress_derivative(Law law, const Lame& lame, const Mat3& F);
 
-/// Both laws hold the change of volume by kappa/2 (theta - 1)^2, where theta is J (neo-hookean) or 1 + tr(E), the same
-/// to first order (saint-venant-kirchhoff). What is left of a law without it is the law of `without_bulk(lame)`.
+/// Every law holds the change of volume by kappa/2 (theta - 1)^2, where theta is J (neo-hookean) or the same to first
+/// order: 1 + tr(E), 1 + tr(S - I), 1 + tr(eps). What is left of a law without it is the law of `without_bulk(lame)`.
 double bulk_modulus(const Lame& lame);
 Lame without_bulk(const Lame& lame);
 double volume_ratio(Law law, const Mat3& F);
@@ -57,7 +60,14 @@ Mat3 volume_ratio_gradient(Law law, const Mat3& F);
 /// d^2 theta / dF^2 on column-major vec(F).
 Mat9 volume_ratio_curvature(Law law, const Mat3& F);
 
-/// P F^T / J, MPa.
+/// Whether the law means something at F; beyond, its answer is not to be trusted.
+///   saint-venant-kirchhoff: every stretch above 1/sqrt(3), below which more compression takes less force
+///   neo-hookean:            not inverted
+///   corotated:              not inverted, and the sum of any two stretches above 1, below which shear has no stiffness
+///   linear:                 |F - I| <= 0.1: strain and rotation are small
+bool in_valid_range(Law law, const Mat3& F);
+
+/// P F^T / J, MPa; of the linear law, which does not tell the two states apart, P.
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F);
 
 /// Eq. 5 of the paper.

@@ -248,6 +248,12 @@ double TetModel::smallest_volume_ratio(const Eigen::VectorXd& u) const {
   return smallest;
 }
 
+bool TetModel::in_valid_range(const Eigen::VectorXd& u) const {
+  for (int e = 0; e < element_count(); ++e)
+    if (!palpate::in_valid_range(tissue_.law, deformation_gradient(u, e))) return false;
+  return true;
+}
+
 Eigen::VectorXd TetModel::reduce(const Eigen::VectorXd& full) const {
   Eigen::VectorXd reduced(unknown_count_);
   for (size_t n = 0; n < first_unknown_.size(); ++n)

@@ -48,6 +48,8 @@ class TetModel {
 
   /// Smallest determinant of F over all elements.
   double smallest_volume_ratio(const Eigen::VectorXd& u) const;
+  /// Whether the law is in its valid range in every element.
+  bool in_valid_range(const Eigen::VectorXd& u) const;
 
   /// The entries of a full vector that belong to unknowns, and back (zero at fixed nodes).
   Eigen::VectorXd reduce(const Eigen::VectorXd& full) const;

@@ -24,8 +24,6 @@ constexpr double kFootprintReach = 1.2;
 /// The ring of tissue watched around a contact, in footprint radii and at least so wide.
 constexpr double kWatchedRadii = 3.5;
 constexpr double kLeastWatched_mm = 8;
-/// Saint Venant-Kirchhoff softens in compression below a stretch of about 0.58 (volume ratio of uniaxial strain).
-constexpr double kLeastVolumeRatio = 0.58;
 constexpr double kStaleMisfit_mm = 3;
 
 std::vector<Vec3> deformed(const TetModel& model, const Eigen::VectorXd& u) {
@@ -128,8 +126,7 @@ struct ForceEstimator::State {
     estimate.residual = equilibrium.residual;
     estimate.status = FrameStatus::not_converged;
     if (held->near_attachment()) estimate.warnings.push_back("near_attachment");
-    if (map.tissue.law == Law::saint_venant_kirchhoff && equilibrium.smallest_volume_ratio < kLeastVolumeRatio)
-      estimate.warnings.push_back("law_out_of_range");
+    if (!held->model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
     // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
     if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
     if (!equilibrium.converged) return;

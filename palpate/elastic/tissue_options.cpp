@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include "palpate/core/errors.h"
+#include "palpate/elastic/material.h"
+
+namespace palpate {
+
+namespace {
+
+struct Preset {
+  std::string name;
+  double young_modulus_kPa;
+  double poisson_ratio;
+  std::string source;
+};
+
+const std::vector<Preset>& presets() {
+  static const std::vector<Preset> kPresets = {
+      {"liver", 27, 0.45, "Haouchine et al. 2018, section VII.A"},
+      {"uterus", 400, 0.35, "Haouchine et al. 2018, section VII.B"},
+      {"liver-elastography", 5.5, 0.45, "Roulot et al. 2008, healthy adults, transient elastography"},
+      {"kidney-cortex", 15.4, 0.45, "Grenier et al. 2013, shear-wave elastography"},
+  };
+  return kPresets;
+}
+
+std::string preset_list() {
+  std::string text;
+  for (const Preset& preset : presets())
+    text += fmt::format("{}{} ({} kPa, {}; {})", text.empty() ? "" : "; ", preset.name, preset.young_modulus_kPa,
+                        preset.poisson_ratio, preset.source);
+  return text;
+}
+
+void fill_from_preset(TissueOptions& tissue) {
+  if (tissue.preset.empty()) {
+    if (tissue.young_modulus_kPa <= 0)
+      throw BadInput("tissue needs young_modulus_kPa (and poisson_ratio), or a preset");
+    return;
+  }
+  std::vector<std::string> names;
+  for (const Preset& preset : presets()) {
+    names.push_back(preset.name);
+    if (preset.name != tissue.preset) continue;
+    if (tissue.young_modulus_kPa > 0)
+      throw BadInput("tissue has both preset and young_modulus_kPa, expected one of them");
+    tissue.young_modulus_kPa = preset.young_modulus_kPa;
+    tissue.poisson_ratio = preset.poisson_ratio;
+    tissue.preset.clear();
+    return;
+  }
+  throw BadInput(fmt::format("tissue.preset is '{}', expected one of: {}", tissue.preset, fmt::join(names, ", ")));
+}
+
+const std::vector<std::pair<std::string, Law>>& law_words() {
+  static const std::vector<std::pair<std::string, Law>> kWords = {
+      {"saint-venant-kirchhoff", Law::saint_venant_kirchhoff},
+      {"neo-hookean", Law::neo_hookean},
+      {"corotated", Law::corotated},
+      {"linear", Law::linear}};
+  return kWords;
+}
+
+}  // namespace
+
+void describe(Settings& settings, TissueOptions& options) {
+  settings.choice("law", options.law, law_words(),
+                  "elastic law; neo-hookean is the one to use for pushing, linear holds for small motions only");
+  settings.number("young_modulus_kPa", options.young_modulus_kPa, {0, 1e8, true, false},
+                  "Young's modulus E; the force is proportional to it");
+  settings.number("poisson_ratio", options.poisson_ratio, {0, 0.5, false, true}, "Poisson's ratio nu");
+  settings.text("preset", options.preset, "instead of the two numbers: " + preset_list());
+  settings.after_reading([&options] { fill_from_preset(options); });
+}
+
+std::string law_name(Law law) {
+  for (const auto& word : law_words())
+    if (word.second == law) return word.first;
+  return {};
+}
+
+Lame lame_of(const TissueOptions& tissue) {
+  const double E = tissue.young_modulus_MPa(), nu = tissue.poisson_ratio;
+  return {E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))};
+}
+
+}  // namespace palpate
