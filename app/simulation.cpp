@@ -5,8 +5,27 @@
 #include "app/progress.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
+#include "palpate/simulate/uterus_demo.h"
 
 namespace palpate::app {
+
+namespace {
+/// The paper's map has 550 elements.
+constexpr int kDemoElements = 550;
+}  // namespace
+
+SceneFile demo_scene() {
+  const SimulatedCase demo = uterus_demo();
+  SceneFile scene_file;
+  scene_file.file = "demo.yaml";
+  scene_file.simulate = demo.simulate;
+  scene_file.has_simulate = true;
+  scene_file.scene.tissue = demo.tissue;
+  scene_file.scene.attachments = demo.attachments;
+  scene_file.scene.contact = demo.contact;
+  scene_file.scene.map.elements = kDemoElements;
+  return scene_file;
+}
 
 SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path& folder, bool quiet,
                         DejaVuSummary& summary) {

@@ -6,29 +6,8 @@
 #include "app/run.h"
 #include "app/simulation.h"
 #include "app/verbs.h"
-#include "palpate/simulate/uterus_demo.h"
 
 namespace palpate::app {
-
-namespace {
-
-/// The paper's map has 550 elements.
-constexpr int kElements = 550;
-
-SceneFile demo_scene() {
-  const SimulatedCase demo = uterus_demo();
-  SceneFile scene_file;
-  scene_file.file = "demo.yaml";
-  scene_file.simulate = demo.simulate;
-  scene_file.has_simulate = true;
-  scene_file.scene.tissue = demo.tissue;
-  scene_file.scene.attachments = demo.attachments;
-  scene_file.scene.contact = demo.contact;
-  scene_file.scene.map.elements = kElements;
-  return scene_file;
-}
-
-}  // namespace
 
 void add_demo(CLI::App& app) {
   struct Arguments {

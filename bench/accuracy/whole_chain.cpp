@@ -5,9 +5,8 @@
 #include "app/run.h"
 #include "app/runtime.h"
 #include "app/simulation.h"
-#include "palpate/simulate/uterus_demo.h"
 
-// Pixels in, newtons out, on every sequence with truth that this machine has: the table of docs/results.md.
+// Pixels in, newtons out, on every sequence with truth that this machine has: the table of README.md.
 namespace {
 
 using namespace palpate;
@@ -25,6 +24,13 @@ std::string or_dash(const std::optional<double>& value, int digits) {
 
 std::string or_dash(const std::optional<int>& value) {
   return value ? fmt::format("{:+d}", *value) : "-";
+}
+
+Case simulated_case(const std::string& name, const SceneFile& scene, const std::filesystem::path& folder) {
+  DejaVuSummary simulated;
+  const std::filesystem::path recording = folder / (name + "_recording");
+  simulate_into(scene, recording, false, simulated);
+  return {name, recording / "scene.yaml", recording / "truth.csv"};
 }
 
 void print_row(const Case& c, const std::filesystem::path& folder) {
@@ -50,17 +56,12 @@ int main(int argc, char** argv) {
   const char* reference = std::getenv("PALPATE_REFERENCE_DATA");
   std::vector<Case> cases;
 
-  SceneFile demo;
-  const SimulatedCase uterus = uterus_demo();
-  demo.simulate = uterus.simulate;
-  demo.has_simulate = true;
-  demo.scene.tissue = uterus.tissue;
-  demo.scene.attachments = uterus.attachments;
-  demo.scene.contact = uterus.contact;
-  demo.scene.map.elements = 550;
-  DejaVuSummary simulated;
-  simulate_into(demo, folder / "recording", false, simulated);
-  cases.push_back({"dejavu_uterus", folder / "recording/scene.yaml", folder / "recording/truth.csv"});
+  cases.push_back(simulated_case("dejavu_demo", demo_scene(), folder));
+  for (const char* study : {"uterus", "liver_slab", "heart"})
+    cases.push_back(simulated_case(
+        fmt::format("dejavu_{}", study),
+        read_scene_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "studies" / fmt::format("{}.yaml", study), false),
+        folder));
   for (const char* sequence : {"rendered_uterus", "rendered_liver"})
     for (const char* scene : {"scene", "scene_volume"}) {
       const std::filesystem::path data = std::filesystem::path(reference ? reference : "") / sequence;
