@@ -8,8 +8,8 @@
 
 #include "palpate/simulate/organ_shape.h"
 #include "palpate/volume/tetrahedralize.h"
-#include "tests/elastic/prescribed.h"
 #include "tests/support/meshes.h"
+#include "tests/support/prescribed.h"
 
 /// The same bodies in CalculiX, a program that shares no code with this one.
 namespace palpate {

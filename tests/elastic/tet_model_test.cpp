@@ -9,6 +9,7 @@
 #include "palpate/elastic/sparse_factor.h"
 #include "palpate/elastic/stress.h"
 #include "tests/support/meshes.h"
+#include "tests/support/prescribed.h"
 
 namespace palpate {
 namespace {
@@ -153,6 +154,26 @@ TEST(TetModel, AveragingTheVolumeRatioUnlocksNearlyIncompressibleBending) {
     EXPECT_LT(share_of_the_beams_deflection(law, 0.499, Element::linear), 0.5);
     EXPECT_NEAR(share_of_the_beams_deflection(law, 0.499, Element::averaged), 1, 0.25);
     EXPECT_NEAR(share_of_the_beams_deflection(law, 0.3, Element::averaged), 1, 0.2);
+  }
+}
+
+TEST(TetModel, WhatMovesTheBodyMovesItAlikeWhateverItsModulusAndTheForceIsProportionalToIt) {
+  const TetMesh mesh = test::box_mesh({20, 20, 10}, {4, 4, 2});
+  std::map<int, Vec3> imposed;
+  for (int node : test::nodes_at(mesh, 2, 10)) imposed[node] = Vec3::Zero();
+  const int touched = test::nodes_at(mesh, 2, 0)[12];
+  imposed[touched] = Vec3(0.5, 0, -2);
+  for (const auto& [law, element] : kCases) {
+    SCOPED_TRACE(law_name(law));
+    const auto solve = [&, law = law, element = element](double E_kPa) {
+      const TetModel model(mesh, {law, E_kPa, 0.45, ""}, test::nodes_of(imposed), element);
+      return test::solve_prescribed(model, imposed, 2);
+    };
+    const auto soft = solve(1), stiff = solve(1e5);
+    ASSERT_TRUE(soft.converged && stiff.converged);
+    EXPECT_LT((stiff.u - soft.u).norm(), 1e-8 * soft.u.norm());
+    const Vec3 force = soft.force.segment<3>(3 * touched);
+    EXPECT_LT((stiff.force.segment<3>(3 * touched) - 1e5 * force).norm(), 1e-8 * 1e5 * force.norm());
   }
 }
 

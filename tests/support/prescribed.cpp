@@ -1,4 +1,4 @@
-#include "tests/elastic/prescribed.h"
+#include "tests/support/prescribed.h"
 
 #include <cmath>
 
