@@ -1,6 +1,5 @@
 #include "palpate/elastic/material.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
@@ -26,13 +25,6 @@ struct LawFunctions {
 
 Eigen::Matrix<double, 9, 1> flat(const Mat3& A) {
   return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(A.data());
-}
-
-/// Squares of the principal stretches, ascending.
-Vec3 squared_stretches(const Mat3& F) {
-  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
-  eigen.computeDirect(F.transpose() * F, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().cwiseMax(0);
 }
 
 /// W = lambda/2 tr(E)^2 + mu E:E, theta = 1 + tr(E).
@@ -70,8 +62,11 @@ struct SaintVenantKirchhoff {
   static Mat3 volume_ratio_gradient(const Mat3& F) { return F; }
   static Mat9 volume_ratio_curvature(const Mat3&) { return Mat9::Identity(); }
 
+  /// F^T F less the bound is positive definite exactly where every squared stretch lies above it (Sylvester).
   static bool in_valid_range(const Mat3& F) {
-    return F.determinant() > 0 && squared_stretches(F)[0] >= kLeastSquaredStretch;
+    const Mat3 above = F.transpose() * F - kLeastSquaredStretch * Mat3::Identity();
+    return F.determinant() > 0 && above(0, 0) > 0 && above.topLeftCorner<2, 2>().determinant() > 0 &&
+           above.determinant() > 0;
   }
 };
 
@@ -192,8 +187,8 @@ struct Corotated {
   /// At kept volume ratio the stiffness against a shear of two principal directions is 2 mu (1 - 1 / (sum of their
   /// stretches)).
   static bool in_valid_range(const Mat3& F) {
-    const Vec3 stretch = squared_stretches(F).cwiseSqrt();
-    return F.determinant() > 0 && stretch[0] + stretch[1] > 1;
+    const Vec3 stretch = Polar(F).stretch;
+    return stretch[2] > 0 && stretch[1] + stretch[2] > 1;
   }
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "tests/support/calculix.h"
 #include "tests/support/prescribed.h"
 #include "tests/support/published_liver.h"
 #include "tests/support/reference_data.h"
@@ -24,6 +25,22 @@ TEST(PublishedForces, TheLinearLawReturnsThoseOfTheLinearLiver) {
     ASSERT_TRUE(found.converged);
     const Vec3 force = test::net_force(liver, found.force);
     EXPECT_LT((force - frame.force_N).norm(), 1e-4 * frame.force_N.norm()) << "frame " << frame.number;
+  }
+}
+
+TEST(PublishedForces, ThatLiverMovedByFiveCentimetresAgreesWithCalculixInTheOtherLaws) {
+  PALPATE_NEEDS_REFERENCE("mestdagh_liver");
+  PALPATE_NEEDS_CALCULIX();
+  const PublishedLiver liver = test::read_published_liver("linear_s1");
+  const auto held = test::held_nodes(liver, liver.frames.front());
+  for (Law law : {Law::saint_venant_kirchhoff, Law::neo_hookean}) {
+    const TetModel model(liver.mesh, {law, 20, 0.45, ""}, test::nodes_of(held));
+    const test::PrescribedEquilibrium ours = test::solve_prescribed(model, held, 5);
+    ASSERT_TRUE(ours.converged);
+    const test::CalculixAnswer theirs = test::run_calculix(liver.mesh, model.tissue(), held);
+    const Vec3 force = test::net_force(liver, theirs.reaction);
+    EXPECT_LT((test::net_force(liver, ours.force) - force).norm(), 1e-5 * force.norm()) << law_name(law);
+    EXPECT_LT((ours.u - theirs.u).lpNorm<Eigen::Infinity>(), 1e-5 * theirs.u.lpNorm<Eigen::Infinity>());
   }
 }
 
