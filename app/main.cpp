@@ -1,14 +1,29 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <exception>
+#include <string>
 
+#include "app/answer.h"
 #include "app/runtime.h"
 #include "app/scene_file.h"
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
 
+namespace {
+
+/// One sentence on standard error; with --json also one object on standard output.
+int fail(const std::string& sentence, int exit_code, bool json) {
+  fmt::print(stderr, "palpate: {}\n", sentence);
+  if (json) fmt::print("{}", palpate::app::json_failure(sentence, exit_code));
+  return exit_code;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace palpate;
+  const bool json = std::find(argv, argv + argc, std::string("--json")) != argv + argc;
   app::choose_blas_core(argv);
   app::watch_for_interrupt();
 
@@ -41,18 +56,16 @@ int main(int argc, char** argv) {
       return app::kWrongUse;
     }
     return app::kDone;
-  } catch (const CLI::RuntimeError& error) {
-    return error.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? app::kDone : app::kWrongUse;
+    if (error.get_exit_code() == 0) return program.exit(error);
+    return fail(std::string(error.what()) + " (palpate --help tells more)", app::kWrongUse, json);
+  } catch (const app::WrongUse& error) {
+    return fail(error.what(), app::kWrongUse, json);
   } catch (const BadInput& error) {
-    fmt::print(stderr, "palpate: {}\n", error.what());
-    return app::kBadInput;
+    return fail(error.what(), app::kBadInput, json);
   } catch (const Unfinished& error) {
-    fmt::print(stderr, "palpate: {}\n", error.what());
-    return app::kNotFinished;
+    return fail(error.what(), app::kNotFinished, json);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "palpate: internal error, please report it: {}\n", error.what());
-    return app::kOurBug;
+    return fail(std::string("internal error, please report it: ") + error.what(), app::kOurBug, json);
   }
 }

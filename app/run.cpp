@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "app/answer.h"
+#include "app/output_folder.h"
 #include "app/progress.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
@@ -17,14 +19,18 @@
 #include "palpate/feedback/map_json.h"
 #include "palpate/feedback/map_preview.h"
 #include "palpate/feedback/overlay.h"
+#include "palpate/feedback/quantile.h"
 #include "palpate/feedback/report.h"
 #include "palpate/feedback/video_writer.h"
+#include "palpate/feedback/warnings.h"
 
 namespace palpate::app {
 
 namespace {
 
 constexpr int kReportPictures = 6;
+/// Outlines may run along the border of the image, not mostly outside.
+constexpr double kLeastShareInImage = 0.5;
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
   std::ofstream stream(file);
@@ -32,10 +38,34 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   if (!stream.flush()) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
 }
 
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(std::round(share * static_cast<double>(values.size() - 1)))];
+/// Runs a stage that knows no scene file; what it finds bad is told with the file, and with `key` where its sentence
+/// does not begin with one.
+template <class Stage>
+auto in_scene(const SceneFile& scene_file, const std::string& key, const Stage& stage) {
+  try {
+    return stage();
+  } catch (const BadInput& error) {
+    const std::string sentence = error.what();
+    const auto names = [&sentence](const char* group) { return sentence.starts_with(group); };
+    const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument");
+    const std::filesystem::path& volume = scene_file.scene.map.volume;
+    const std::string told = names_key                                                  ? ""
+                             : !volume.empty() && sentence.starts_with(volume.string()) ? "map.volume: "
+                                                                                        : key + ": ";
+    throw BadInput(fmt::format("{}: {}{}", scene_file.file.string(), told, sentence));
+  }
+}
+
+/// A region drawn in a picture of another size selects the wrong tissue, or none.
+void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size size) {
+  if (region_px.empty()) return;
+  const std::vector<cv::Point2f> corners(region_px.begin(), region_px.end());
+  const cv::Rect2f around = cv::boundingRect(corners), image({0, 0}, cv::Size2f(size));
+  if ((around & image).area() >= kLeastShareInImage * around.area()) return;
+  throw BadInput(fmt::format(
+      "map.organ_region_px reaches from ({:g}, {:g}) to ({:g}, {:g}), expected corners inside the left image of {}x{} "
+      "px",
+      around.tl().x, around.tl().y, around.br().x - 1, around.br().y - 1, size.width, size.height));
 }
 
 std::string run_yaml(SceneFile scene_file, const Rectification& rectification) {
@@ -115,9 +145,11 @@ struct RunFiles {
   void close() {
     overlay.finish();
     Report report;
-    report.title = options.folder.filename().string();
+    report.title = std::filesystem::weakly_canonical(options.folder).filename().string();
     report.rows = rows;
-    if (!options.truth.empty()) report.truth = read_forces(options.truth);
+    if (!options.truth.empty()) report.truth = read_truth(options.truth);
+    // Frames are matched by number; a truth may count its time from elsewhere, or name none.
+    for (ForceRow& row : report.truth) row.time_s = row.frame / built.fps;
     report.times = times;
     report.tissue = scene_file.scene.tissue;
     report.settings = run_yaml(scene_file, built.rectification);
@@ -128,39 +160,57 @@ struct RunFiles {
 
 RunSummary summary_of(const RunFiles& files, double map_s) {
   RunSummary summary;
+  summary.folder = files.options.folder;
+  summary.tissue = files.scene_file.scene.tissue;
   summary.frames = static_cast<int>(files.rows.size());
   summary.elements = static_cast<int>(files.built.map.mesh.tetrahedra.size());
   summary.map_s = map_s;
   std::vector<double> frame_ms;
   for (const FrameTimes& times : files.times) frame_ms.push_back(times.total_ms());
-  summary.median_frame_ms = percentile(frame_ms, 0.5);
-  summary.p99_frame_ms = percentile(frame_ms, 0.99);
+  summary.median_frame_ms = quantile(frame_ms, 0.5);
+  summary.p99_frame_ms = quantile(frame_ms, 0.99);
   for (const ForceRow& row : files.rows) {
     summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);
     ++summary.frames_by_status[row.status];
   }
-  if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_forces(files.options.truth));
+  summary.frames_by_warning = count_warnings(files.rows);
+  if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_truth(files.options.truth));
   return summary;
+}
+
+double force_per_modulus_N_per_kPa(const RunSummary& summary) {
+  return summary.tissue.young_modulus_kPa > 0 ? summary.peak_force_N / summary.tissue.young_modulus_kPa : 0;
 }
 
 }  // namespace
 
 BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
   const Scene& scene = scene_file.scene;
-  Recording recording(scene.recording);
-  const StereoRig rig = read_rig(scene.recording.calibration, scene.recording.translation_unit);
-  check_rig_fits(rig, recording.size());
+  const auto opened = [&](const std::string& key, const auto& stage) { return in_scene(scene_file, key, stage); };
+  Recording recording = opened("recording", [&] { return Recording(scene.recording); });
+  const StereoRig rig = opened("recording.calibration", [&] {
+    const StereoRig read = read_rig(scene.recording.calibration, scene.recording.translation_unit);
+    check_rig_fits(read, recording.size());
+    return read;
+  });
+  if (!scene.instrument.track.empty())
+    opened("instrument.track", [&] { return read_tip_track(scene.instrument.track); });
   if (!quiet) fmt::print(stderr, "calibration {}\n", describe_rig(rig, recording.size()));
   BuiltMap built;
+  built.fps = recording.fps();
+  built.frame_count = recording.frame_count();
   built.rectification = make_rectification(rig, recording.size());
-  while (auto frame = recording.next()) {
-    if (frame->index < scene.map.frame) continue;
+  opened("map", [&] {
+    require_region_in_image(scene.map.organ_region_px, recording.size());
+    std::optional<StereoFrame> frame = recording.next();
+    while (frame && frame->index < scene.map.frame) frame = recording.next();
+    if (!frame)
+      throw BadInput(
+          fmt::format("map.frame is {}, but the recording has only {} frames", scene.map.frame, built.frame_count));
     built.frame = *frame;
     built.map = build_tissue_map(built.frame, built.rectification, scene.map, scene.tissue, scene.attachments);
-    return built;
-  }
-  throw BadInput(fmt::format("{}: map.frame is {}, but the recording has only {} frames",
-                             scene_file.file.filename().string(), scene.map.frame, recording.frame_count()));
+  });
+  return built;
 }
 
 void write_map_files(const BuiltMap& built, const std::filesystem::path& folder) {
@@ -178,7 +228,8 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
 }
 
 RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) {
-  if (!options.truth.empty()) read_forces(options.truth);
+  require_output_folder(options.folder);
+  if (!options.truth.empty()) read_truth(options.truth);
   Stopwatch watch;
   const BuiltMap built = build_map(scene_file, options.quiet);
   const double map_s = watch.lap_ms() / 1000;
@@ -194,6 +245,11 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
   write_map_files(built, options.folder);
   write_text(options.folder / "run.yaml", run_yaml(scene_file, built.rectification));
   RunFiles files(scene_file, options, built, recording);
+  const auto kept = [&](const std::exception& reason) {
+    files.close();
+    return Unfinished(
+        fmt::format("{}; {} frames are kept in {}", reason.what(), files.rows.size(), options.folder.string()));
+  };
   try {
     Progress progress("estimate", options.quiet);
     while (auto frame = recording.next()) {
@@ -204,9 +260,9 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
       if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
     }
   } catch (const Unfinished& reason) {
-    files.close();
-    throw Unfinished(
-        fmt::format("{}; {} frames are kept in {}", reason.what(), files.rows.size(), options.folder.string()));
+    throw kept(reason);
+  } catch (const BadInput& reason) {  // an image in the middle that does not open
+    throw kept(reason);
   }
   files.close();
   return summary_of(files, map_s);
@@ -222,8 +278,16 @@ std::string to_text(const RunSummary& summary) {
     statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
   line("frames", fmt::format("{} ({})", summary.frames, statuses));
   line("map", fmt::format("{} tetrahedra in {:.2f} s", summary.elements, summary.map_s));
-  line("time per frame", fmt::format("{:.1f} ms median, {:.1f} ms p99", summary.median_frame_ms, summary.p99_frame_ms));
-  line("peak force", fmt::format("{:.2f} N", summary.peak_force_N));
+  line("time per frame",
+       fmt::format("{:.1f} ms median, {:.1f} ms for 99 %", summary.median_frame_ms, summary.p99_frame_ms));
+  const TissueOptions& tissue = summary.tissue;
+  line("tissue assumed", fmt::format("{}, E = {:g} kPa, nu = {:g}", law_name(tissue.law), tissue.young_modulus_kPa,
+                                     tissue.poisson_ratio));
+  line("peak force", fmt::format("{:.2f} N, that is {:.3g} N per kPa of E", summary.peak_force_N,
+                                 force_per_modulus_N_per_kPa(summary)));
+  for (const auto& [name, frames] : summary.frames_by_warning)
+    line("warning", fmt::format("{} frames: {} ({})", frames, warning_words(name), name));
+  line("written to", summary.folder.string());
   if (!summary.comparison) return text;
   const Comparison& c = *summary.comparison;
   line("true peak force", fmt::format("{:.2f} N", c.true_peak_N));
@@ -238,17 +302,21 @@ std::string to_text(const RunSummary& summary) {
   return text;
 }
 
-std::string to_json(const RunSummary& summary) {
+nlohmann::ordered_json to_json(const RunSummary& summary) {
   nlohmann::ordered_json json;
+  json["folder"] = summary.folder.string();
   json["frames"] = summary.frames;
   json["frames_by_status"] = summary.frames_by_status;
+  json["frames_by_warning"] = summary.frames_by_warning;
   json["elements"] = summary.elements;
   json["map_s"] = summary.map_s;
   json["median_frame_ms"] = summary.median_frame_ms;
   json["p99_frame_ms"] = summary.p99_frame_ms;
+  json["tissue"] = tissue_json(summary.tissue);
   json["peak_force_N"] = summary.peak_force_N;
+  json["peak_force_per_modulus_N_per_kPa"] = force_per_modulus_N_per_kPa(summary);
   if (summary.comparison) json["comparison"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison));
-  return json.dump(1) + "\n";
+  return json;
 }
 
 }  // namespace palpate::app

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 
 #include "app/scene_file.h"
@@ -16,6 +18,8 @@ struct RunOptions {
 
 /// Figures of one run, for people and machines.
 struct RunSummary {
+  std::filesystem::path folder;  ///< where the results are
+  TissueOptions tissue;
   int frames = 0;
   int elements = 0;
   double map_s = 0;
@@ -23,27 +27,33 @@ struct RunSummary {
   double p99_frame_ms = 0;
   double peak_force_N = 0;
   std::map<std::string, int> frames_by_status;
+  std::map<std::string, int> frames_by_warning;
   std::optional<Comparison> comparison;
 };
 
-/// A map and the frame it was built from.
+/// A map, and the frame and recording it was built from.
 struct BuiltMap {
+  double fps = 0;
+  int frame_count = -1;  ///< -1 = unknown
   StereoFrame frame;
   Rectification rectification;
   TissueMap map;
 };
 
-/// The build stage of a scene: opens the recording, reads up to the map frame, builds. Throws BadInput, Unfinished.
+/// The build stage of a scene: opens all that the scene names, reads up to the map frame, builds. Throws BadInput with
+/// a sentence that names the scene file, Unfinished.
 BuiltMap build_map(const SceneFile& scene_file, bool quiet);
 
 /// map.vtu, surface.ply, cloud.ply, preview.png, map.json.
 void write_map_files(const BuiltMap& built, const std::filesystem::path& folder);
 
 /// Both stages of a scene, with every file of the contract. Nothing is written before the map stands. Throws BadInput;
-/// throws Unfinished when the video ends early or the user interrupts, with all rows and pictures so far on the disk.
+/// throws Unfinished when the recording ends early or spoils on the way or the user interrupts, with all rows and
+/// pictures so far on the disk.
 RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options);
 
+/// Lines of name and value.
 std::string to_text(const RunSummary& summary);
-std::string to_json(const RunSummary& summary);
+nlohmann::ordered_json to_json(const RunSummary& summary);
 
 }  // namespace palpate::app

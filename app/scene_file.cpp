@@ -33,8 +33,7 @@ SceneFile read_scene_file(const std::filesystem::path& file, bool needs_recordin
   describe(settings, scene_file);
   read_settings_file(file, settings);
   if (needs_recording && !scene_file.has_recording)
-    throw BadInput(
-        fmt::format("{}: recording is missing (the two videos and their calibration)", file.filename().string()));
+    throw BadInput(fmt::format("{}: recording is missing (the two videos and their calibration)", file.string()));
   return scene_file;
 }
 

@@ -1,12 +1,50 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "app/answer.h"
 #include "app/run.h"
 #include "app/verbs.h"
 
 namespace palpate::app {
+
+namespace {
+
+std::vector<std::string> attachment_kinds(const AttachmentOptions& attachments) {
+  using Kind = AttachmentRegion::Kind;
+  const std::map<Kind, std::string> names = {{Kind::underside, "underside"},
+                                             {Kind::box, "box"},
+                                             {Kind::oriented_box, "oriented_box"},
+                                             {Kind::sphere, "sphere"},
+                                             {Kind::polygon, "polygon_px"}};
+  std::vector<std::string> kinds;
+  for (const AttachmentRegion& region : attachments.regions)
+    if (names.count(region.kind)) kinds.push_back(names.at(region.kind));
+  return kinds;
+}
+
+nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& built) {
+  const StereoRig& rig = built.rectification.rig;
+  const cv::Size size = built.frame.left.size();
+  const cv::Point2d field = field_of_view_deg(rig.left, size);
+  nlohmann::ordered_json json;
+  json["scene"] = scene_file.file.string();
+  json["recording"] = {{"image_size_px", {size.width, size.height}}, {"fps", built.fps}};
+  json["recording"]["frames"] = built.frame_count >= 0 ? nlohmann::ordered_json(built.frame_count) : nullptr;
+  json["calibration"] = {
+      {"focal_px", rig.left.K(0, 0)}, {"baseline_mm", rig.baseline_mm()}, {"field_of_view_deg", {field.x, field.y}}};
+  json["tissue"] = tissue_json(scene_file.scene.tissue);
+  json["attachments"] = attachment_kinds(scene_file.scene.attachments);
+  json["points"] = built.map.cloud.size();
+  json["coverage"] = built.map.report.coverage;
+  json["elements"] = built.map.mesh.tetrahedra.size();
+  json["fixed_nodes"] = built.map.fixed_nodes.size();
+  return json;
+}
+
+}  // namespace
 
 void add_check(CLI::App& app) {
   struct Arguments {
@@ -15,15 +53,14 @@ void add_check(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("check", "Says what is wrong with an input before anything runs; writes nothing");
-  verb->add_option("scene", arguments->scene, "scene.yaml")->required();
+  verb->add_option("scene", arguments->scene, "scene.yaml")->required()->type_name("SCENE");
   verb->add_flag("--json", arguments->json, "answer as JSON");
   verb->footer("Example: palpate check scene.yaml");
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
-    if (!scene_file.scene.instrument.track.empty()) read_tip_track(scene_file.scene.instrument.track);
     const BuiltMap built = build_map(scene_file, arguments->json);
     if (arguments->json) {
-      fmt::print("{}\n", nlohmann::json{{"ok", true}, {"elements", built.map.mesh.tetrahedra.size()}}.dump());
+      fmt::print("{}", json_success(json_of(scene_file, built)));
       return;
     }
     fmt::print("{}: fine. {} points ({:.0f} % of the organ region), {} tetrahedra, {} attached nodes.\n",

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <nlohmann/json.hpp>
 
+#include "app/answer.h"
 #include "app/run.h"
 #include "app/verbs.h"
 
@@ -15,16 +17,17 @@ void add_estimate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb =
       app.add_subcommand("estimate", "Both stages: two videos in, forces.csv, overlay.mp4, report.html out");
-  verb->add_option("scene", arguments->scene, "scene.yaml")->required();
-  verb->add_option("-o,--output", arguments->folder, "folder for the results")->capture_default_str();
-  verb->add_option("--truth", arguments->truth, "truth.csv to compare with in the report");
+  verb->add_option("scene", arguments->scene, "scene.yaml")->required()->type_name("SCENE");
+  verb->add_option("-o,--output", arguments->folder, "folder for the results")
+      ->type_name("FOLDER")
+      ->capture_default_str();
+  verb->add_option("--truth", arguments->truth, "truth.csv to compare with in the report")->type_name("FILE");
   verb->add_flag("--json", arguments->json, "figures as JSON on standard output, no progress");
   verb->footer("Example: palpate estimate scene.yaml -o results --truth truth.csv");
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     const RunSummary summary = run_estimate(scene_file, {arguments->folder, arguments->truth, arguments->json});
-    fmt::print("{}", arguments->json ? to_json(summary) : to_text(summary));
-    if (!arguments->json) fmt::print("{:<22}{}\n", "written to", arguments->folder.string());
+    fmt::print("{}", arguments->json ? json_success(to_json(summary)) : to_text(summary));
   });
 }
 

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <nlohmann/json.hpp>
 
+#include "app/answer.h"
+#include "app/output_folder.h"
 #include "app/run.h"
 #include "app/verbs.h"
 #include "palpate/feedback/map_json.h"
@@ -15,17 +18,22 @@ void add_map(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("map", "Build stage: map.vtu, surface.ply, cloud.ply, preview.png, map.json");
-  verb->add_option("scene", arguments->scene, "scene.yaml")->required();
-  verb->add_option("-o,--output", arguments->folder, "folder for the results")->capture_default_str();
+  verb->add_option("scene", arguments->scene, "scene.yaml")->required()->type_name("SCENE");
+  verb->add_option("-o,--output", arguments->folder, "folder for the results")
+      ->type_name("FOLDER")
+      ->capture_default_str();
   verb->add_flag("--json", arguments->json, "map.json on standard output too, no progress");
   verb->footer("Example: palpate map scene.yaml -o map");
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
+    require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
     std::filesystem::create_directories(arguments->folder);
     write_map_files(built, arguments->folder);
     if (arguments->json) {
-      fmt::print("{}\n", map_json(built.map, built.rectification));
+      auto json = nlohmann::ordered_json::parse(map_json(built.map, built.rectification));
+      json["folder"] = arguments->folder.string();
+      fmt::print("{}", json_success(json));
       return;
     }
     const MapReport& report = built.map.report;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <stdexcept>
 
 namespace palpate::app {
 
@@ -9,6 +10,11 @@ constexpr int kOurBug = 1;
 constexpr int kWrongUse = 2;
 constexpr int kBadInput = 3;
 constexpr int kNotFinished = 4;
+
+/// The command line asks for what is not there.
+struct WrongUse : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// Each adds its verb to the command line. The verb's work runs in its callback and throws BadInput or Unfinished.
 void add_demo(CLI::App& app);

@@ -9,10 +9,7 @@ void add_later_verbs(CLI::App& app) {
     CLI::App* verb = app.add_subcommand(name, "not there yet");
     verb->allow_extras();
     verb->footer(fmt::format("Example: palpate {} is not there yet", name));
-    verb->callback([name] {
-      fmt::print(stderr, "palpate {}: this verb is not there yet\n", name);
-      throw CLI::RuntimeError(kWrongUse);
-    });
+    verb->callback([name] { throw WrongUse(fmt::format("the verb {} is not there yet", name)); });
   }
 }
 

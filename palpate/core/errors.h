@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -16,5 +17,9 @@ struct BadInput : std::runtime_error {
 struct Unfinished : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// What stands between us and the content of a file, as the end of a sentence: "does not exist", "is a folder", "is
+/// empty", "cannot be opened (Permission denied)"; "" = nothing.
+std::string obstacle_to_reading(const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <sstream>
 
 #include "palpate/core/errors.h"
 
@@ -17,16 +19,33 @@ std::string shortest(double value) {
   return fmt::format("{}", value);
 }
 
+constexpr size_t kMostShown = 60;
+
+/// What a file says, fit for a sentence: on one line and not too long.
+std::string shown(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = ' ';
+  if (text.size() <= kMostShown) return text;
+  size_t end = kMostShown;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // whole UTF-8 characters
+  return text.substr(0, end) + "...";
+}
+
+/// "scene.yaml:12"
+std::string place_of(const YAML::Node& node, const SettingsContext& context) {
+  const YAML::Mark mark = node.Mark();
+  const std::string file = context.file.string();
+  return mark.is_null() ? file : fmt::format("{}:{}", file, mark.line + 1);
+}
+
 /// "scene.yaml:12: map.thickness_mm"
 std::string place_of(const YAML::Node& node, const SettingsContext& context, const std::string& key) {
-  const YAML::Mark mark = node.Mark();
-  const std::string file = context.file.filename().string();
-  return mark.is_null() ? fmt::format("{}: {}", file, key) : fmt::format("{}:{}: {}", file, mark.line + 1, key);
+  return fmt::format("{}: {}", place_of(node, context), shown(key));
 }
 
 std::string written(const YAML::Node& node) {
   if (!node || node.IsNull()) return "nothing";
-  if (node.IsScalar()) return "'" + node.Scalar() + "'";
+  if (node.IsScalar()) return "'" + shown(node.Scalar()) + "'";
   return node.IsMap() ? "a group of keys" : "a list";
 }
 
@@ -72,6 +91,13 @@ bool is_plain_yaml_text(const std::string& text) {
   return !text.empty() &&
          text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./") ==
              std::string::npos;
+}
+
+/// Tabs, newlines and everything above are text; other control characters are not.
+bool is_text(const std::string& content) {
+  return std::all_of(content.begin(), content.end(), [](char c) {
+    return static_cast<unsigned char>(c) >= ' ' || c == '\n' || c == '\r' || c == '\t';
+  });
 }
 
 std::string yaml_text(const std::string& text) {
@@ -284,8 +310,9 @@ void Settings::choice_by_index(const std::string& key, const std::vector<std::st
     const auto found = std::find(names.begin(), names.end(), word);
     if (found == names.end()) {
       const std::string nearest = nearest_word(word, names);
-      throw BadInput(fmt::format("{} is {}, expected one of: {}{}", place, written(node), fmt::join(names, ", "),
-                                 nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+      throw BadInput(fmt::format("{} is {}{}, expected one of: {}{}", place, written(node),
+                                 word.ends_with(".onnx") ? "; networks are not available yet in this version" : "",
+                                 fmt::join(names, ", "), nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
     }
     set(static_cast<int>(found - names.begin()));
   };
@@ -360,6 +387,10 @@ void Settings::list(const std::string& key, const std::string& doc, const std::f
   entries_.push_back(std::move(entry));
 }
 
+void Settings::not_yet(const std::vector<std::string>& keys) {
+  not_yet_.insert(not_yet_.end(), keys.begin(), keys.end());
+}
+
 void Settings::require(const std::string& key) {
   for (auto& entry : entries_)
     if (entry->key == key) entry->required = true;
@@ -372,6 +403,11 @@ void Settings::after_reading(const std::function<void()>& check) {
 void read_settings(const YAML::Node& node, const SettingsContext& context, Settings& settings,
                    const std::string& prefix) {
   const std::string group_name = prefix.empty() ? "the file" : prefix.substr(0, prefix.size() - 1);
+  const auto refuse_not_yet = [&](const YAML::Node& at, const std::string& key, const std::string& name) {
+    if (std::find(settings.not_yet_.begin(), settings.not_yet_.end(), key) != settings.not_yet_.end())
+      throw BadInput(fmt::format("{} is not available yet in this version", place_of(at, context, name)));
+  };
+  if (node.IsSequence() && node.size() > 1) refuse_not_yet(node[1], "[1]", group_name + "[1]");
   if (!node.IsMap() && !node.IsNull())
     throw BadInput(
         fmt::format("{} is {}, expected a group of keys", place_of(node, context, group_name), written(node)));
@@ -383,6 +419,7 @@ void read_settings(const YAML::Node& node, const SettingsContext& context, Setti
     const std::string place = place_of(pair.first, context, prefix + key);
     const auto found = std::find(names.begin(), names.end(), key);
     if (found == names.end()) {
+      refuse_not_yet(pair.first, key, prefix + key);
       const std::string nearest = nearest_word(key, names);
       throw BadInput(nearest.empty() ? fmt::format("{} is not a known key; known in {}: {}", place, group_name,
                                                    fmt::join(names, ", "))
@@ -395,25 +432,29 @@ void read_settings(const YAML::Node& node, const SettingsContext& context, Setti
   }
   for (const auto& entry : settings.entries_)
     if (entry->required && std::find(seen.begin(), seen.end(), entry->key) == seen.end())
-      throw BadInput(
-          fmt::format("{}: {}{} is missing ({})", context.file.filename().string(), prefix, entry->key, entry->doc));
+      throw BadInput(fmt::format("{}: {}{} is missing ({})", place_of(node, context), prefix, entry->key, entry->doc));
   for (const auto& check : settings.checks_) {
     try {
       check();
     } catch (const BadInput& error) {
-      throw BadInput(fmt::format("{}: {}", place_of(node, context, group_name), error.what()));
+      const bool names_group = std::string(error.what()).starts_with(group_name);
+      throw BadInput(fmt::format("{}: {}", names_group ? place_of(node, context) : place_of(node, context, group_name),
+                                 error.what()));
     }
   }
 }
 
 void read_settings_file(const std::filesystem::path& file, Settings& settings) {
-  if (!std::filesystem::is_regular_file(file))
-    throw BadInput(fmt::format("{}: no such file, expected a YAML scene file", file.string()));
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
+  std::ostringstream content;
+  content << std::ifstream(file, std::ios::binary).rdbuf();
+  if (!is_text(content.str())) throw BadInput(fmt::format("{} is no text, expected a YAML scene file", file.string()));
   YAML::Node root;
   try {
-    root = YAML::LoadFile(file.string());
+    root = YAML::Load(content.str());
   } catch (const YAML::Exception& error) {
-    throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.filename().string(), error.mark.line + 1, error.msg));
+    throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1, shown(error.msg)));
   }
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   read_settings(root, {file, folder}, settings);

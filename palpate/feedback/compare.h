@@ -25,7 +25,7 @@ struct Comparison {
   std::optional<double> force_correlation;
   std::optional<double> peak_force_error_pct;
   std::optional<double> gain;  ///< best scale: estimate = gain * truth
-  double vector_rmse_N = 0;
+  std::optional<double> vector_rmse_N;
   std::optional<double> vector_correlation;
   std::optional<double> direction_error_deg_median;  ///< where the true force is above a quarter of its peak
   std::optional<bool> sign_flipped;
@@ -42,7 +42,7 @@ struct Comparison {
   std::optional<double> tip_rmse_contact_mm;
 };
 
-/// Throws BadInput when the truth is empty or not finite.
+/// Throws BadInput when the truth is empty or a magnitude in it is not finite.
 Comparison compare(const std::vector<ForceRow>& estimate, const std::vector<ForceRow>& truth);
 
 /// One figure by its name; std::monostate where nothing can be said.

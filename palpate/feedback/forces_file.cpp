@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "palpate/core/errors.h"
+#include "palpate/feedback/csv_table.h"
 
 namespace palpate {
 namespace {
@@ -36,83 +35,34 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-std::vector<std::string> split_line(std::string line) {
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  std::vector<std::string> fields(1);
-  for (const char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
+/// Frames are numbered; a row without its number belongs to none.
+int frame_of(const CsvTable& table, const CsvTable::Row& row, const std::filesystem::path& file) {
+  const double frame = table.number(row, "frame");
+  if (!(std::abs(frame) < std::numeric_limits<int>::max()))
+    throw BadInput(fmt::format("{}, line {}: column frame is \"{}\", expected a number", file.string(), row.line,
+                               table.text(row, "frame")));
+  return static_cast<int>(frame);
 }
 
-std::string trimmed(const std::string& text) {
-  const size_t first = text.find_first_not_of(" \t");
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-/// One line of a table whose columns are known by name.
-class LineReader {
- public:
-  LineReader(const std::filesystem::path& file, const std::string& header_line) : file_(file) {
-    const std::vector<std::string> names = split_line(header_line);
-    for (size_t i = 0; i < names.size(); ++i) column_[trimmed(names[i])] = i;
-  }
-
-  bool has(const std::string& name) const { return column_.count(name) > 0; }
-
-  void take(const std::string& text, int line) {
-    fields_ = split_line(text);
-    line_ = line;
-    if (fields_.size() < column_.size())
-      throw BadInput(
-          fmt::format("{}, line {}: {} fields, expected {}", file_.string(), line_, fields_.size(), column_.size()));
-  }
-
-  std::string text(const std::string& name) const { return has(name) ? trimmed(fields_[column_.at(name)]) : ""; }
-
-  double number(const std::string& name) const {
-    if (!has(name)) return 0;
-    const std::string field = text(name);
-    double value = 0;
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error != std::errc() || end != field.data() + field.size())
-      throw BadInput(
-          fmt::format("{}, line {}: column {} is \"{}\", expected a number", file_.string(), line_, name, field));
-    return value;
-  }
-
-  Vec3 vector(const std::string& x, const std::string& y, const std::string& z) const {
-    return {number(x), number(y), number(z)};
-  }
-
- private:
-  std::filesystem::path file_;
-  std::map<std::string, size_t> column_;
-  std::vector<std::string> fields_;
-  int line_ = 0;
-};
-
-ForceRow parse_row(const LineReader& line) {
+ForceRow parse_row(const CsvTable& table, const CsvTable::Row& line, const std::filesystem::path& file) {
+  const auto number = [&](const char* column) { return table.number(line, column); };
+  const auto vector = [&](const char* x, const char* y, const char* z) {
+    return Vec3(number(x), number(y), number(z));
+  };
   ForceRow row;
-  row.frame = static_cast<int>(line.number("frame"));
-  row.time_s = line.number("time_s");
-  row.status = line.text("status");
-  row.in_contact = line.number("in_contact") > 0.5;
-  row.force_N = line.vector("fx_N", "fy_N", "fz_N");
-  row.force_magnitude_N = line.number("force_N");
-  row.mean_nodal_force_N = line.number("mean_nodal_force_N");
-  row.tip_mm = line.has("tip_x_mm") ? line.vector("tip_x_mm", "tip_y_mm", "tip_z_mm")
-                                    : Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
-  row.max_von_mises_kPa = line.number("max_von_mises_kPa");
-  row.residual = line.number("residual");
-  row.frame_ms = line.number("frame_ms");
-  row.misfit_mm = line.number("misfit_mm");
-  row.warnings = line.text("warnings");
+  row.frame = frame_of(table, line, file);
+  row.time_s = finite_or(number("time_s"), 0);
+  row.status = table.text(line, "status");
+  row.in_contact = number("in_contact") > 0.5;
+  row.force_N = vector("fx_N", "fy_N", "fz_N");
+  row.force_magnitude_N = number("force_N");
+  row.mean_nodal_force_N = finite_or(number("mean_nodal_force_N"), 0);
+  row.tip_mm = vector("tip_x_mm", "tip_y_mm", "tip_z_mm");
+  row.max_von_mises_kPa = finite_or(number("max_von_mises_kPa"), 0);
+  row.residual = finite_or(number("residual"), 0);
+  row.frame_ms = finite_or(number("frame_ms"), 0);
+  row.misfit_mm = finite_or(number("misfit_mm"), 0);
+  row.warnings = table.text(line, "warnings");
   return row;
 }
 
@@ -162,20 +112,23 @@ void ForcesWriter::write(const ForceRow& row) {
 }
 
 std::vector<ForceRow> read_forces(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  std::string text;
-  if (!stream || !std::getline(stream, text))
-    throw BadInput(fmt::format("{}: cannot be read, expected a table of forces (CSV)", file.string()));
-  LineReader line(file, text);
-  for (const char* name : {"frame", "in_contact", "fx_N", "fy_N", "fz_N", "force_N"})
-    if (!line.has(name)) throw BadInput(fmt::format("{}, line 1: column {} is missing", file.string(), name));
-
+  const CsvTable table(file);
+  for (const char* name : {"frame", "force_N"})
+    if (!table.has(name))
+      throw BadInput(fmt::format("{}: column {} is missing, expected a table of forces", file.string(), name));
   std::vector<ForceRow> rows;
-  for (int number = 2; std::getline(stream, text); ++number) {
-    if (trimmed(text).empty() || text == "\r") continue;
-    line.take(text, number);
-    rows.push_back(parse_row(line));
-  }
+  for (const CsvTable::Row& row : table.rows()) rows.push_back(parse_row(table, row, file));
+  return rows;
+}
+
+std::vector<ForceRow> read_truth(const std::filesystem::path& file) {
+  std::vector<ForceRow> rows = read_forces(file);
+  if (rows.empty())
+    throw BadInput(fmt::format("{}: holds no frame, expected at least one row of truth", file.string()));
+  for (const ForceRow& row : rows)
+    if (!std::isfinite(row.force_magnitude_N))
+      throw BadInput(fmt::format("{}: force_N of frame {} is no finite number, expected the true force in N",
+                                 file.string(), row.frame));
   return rows;
 }
 

@@ -49,10 +49,12 @@ class ForcesWriter {
   std::ofstream stream_;
 };
 
-/// Rows of forces.csv or truth.csv in the order of the file; columns are found by name. frame, in_contact, the three
-/// force components and force_N must be there; without tip columns no row has a tip (a force plate knows none). "nan"
-/// is read as such (other programs write it). Throws BadInput with file and line: missing file, missing column, a field
-/// that is no number.
+/// Rows of forces.csv or truth.csv in the order of the file; columns are found by name (CsvTable). frame and force_N
+/// must be there. What is missing, or is no finite number, claims nothing: a force or a tip is NaN then, in_contact
+/// false. Throws BadInput: missing file, missing column, a row without frame number.
 std::vector<ForceRow> read_forces(const std::filesystem::path& file);
+
+/// The same for a truth to compare with: throws BadInput also where it has no row or a force_N that is not finite.
+std::vector<ForceRow> read_truth(const std::filesystem::path& file);
 
 }  // namespace palpate

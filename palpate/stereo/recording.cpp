@@ -158,9 +158,8 @@ std::unique_ptr<Source> open_source(const std::filesystem::path& path, const std
   } else if (name.find('%') != std::string::npos) {
     return open_pattern(path, key, numbers);
   } else {
-    if (!std::filesystem::is_regular_file(path))
-      throw BadInput(fmt::format("recording.{}: {} does not exist", key, name));
-    if (std::filesystem::file_size(path) == 0) throw BadInput(fmt::format("recording.{}: {} is empty", key, name));
+    if (const std::string obstacle = obstacle_to_reading(path); !obstacle.empty())
+      throw BadInput(fmt::format("recording.{}: {} {}, expected a video", key, name, obstacle));
     if (is_image_name(path)) return std::make_unique<ImageFiles>(std::vector{path}, key);
     capture.open(name, cv::CAP_FFMPEG);
   }
@@ -190,6 +189,11 @@ void check_options(const RecordingOptions& options) {
     throw BadInput(
         fmt::format("recording.{} is missing, expected both left and right", options.left.empty() ? "left" : "right"));
   if (!any && options.stereo.empty()) throw BadInput("recording: expected left and right, or stereo with its layout");
+  std::error_code ignored;
+  if (two && (options.left == options.right || std::filesystem::equivalent(options.left, options.right, ignored)))
+    throw BadInput(fmt::format(
+        "recording.left and recording.right are the same, {}, expected one for each eye (or stereo with its layout)",
+        options.left.string()));
 }
 
 }  // namespace

@@ -21,11 +21,10 @@ constexpr double kLeastBaseline_mm = 1;
 constexpr double kMostBaseline_mm = 200;
 
 std::string text_of(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw BadInput(fmt::format("{}: the calibration file cannot be opened", file.string()));
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(fmt::format("{} {}, expected a calibration file", file.string(), obstacle));
   std::stringstream text;
-  text << stream.rdbuf();
-  if (text.str().empty()) throw BadInput(fmt::format("{}: the calibration file is empty", file.string()));
+  text << std::ifstream(file).rdbuf();
   return text.str();
 }
 
@@ -212,8 +211,6 @@ StereoRig read_ros(const std::filesystem::path& path, TranslationUnit unit) {
 }  // namespace
 
 StereoRig read_rig(const std::filesystem::path& calibration, TranslationUnit unit) {
-  if (!std::filesystem::is_regular_file(calibration))
-    throw BadInput(fmt::format("{}: the calibration file does not exist", calibration.string()));
   const std::string text = text_of(calibration);
   const bool is_ros = text.find("camera_matrix") != std::string::npos &&
                       text.find("projection_matrix") != std::string::npos &&
@@ -254,11 +251,15 @@ void check_rig_fits(const StereoRig& rig, cv::Size video_size) {
   }
 }
 
-std::string describe_rig(const StereoRig& rig, cv::Size video_size) {
-  const double fx = rig.left.K(0, 0), fy = rig.left.K(1, 1);
+cv::Point2d field_of_view_deg(const Camera& camera, cv::Size video_size) {
   const auto degrees = [](double size, double focal) { return 2 * std::atan(0.5 * size / focal) * 180 / CV_PI; };
+  return {degrees(video_size.width, camera.K(0, 0)), degrees(video_size.height, camera.K(1, 1))};
+}
+
+std::string describe_rig(const StereoRig& rig, cv::Size video_size) {
+  const cv::Point2d field = field_of_view_deg(rig.left, video_size);
   return fmt::format("baseline {:.2f} mm, focal {:.0f} px, field of view {:.0f} x {:.0f} degrees", rig.baseline_mm(),
-                     fx, degrees(video_size.width, fx), degrees(video_size.height, fy));
+                     rig.left.K(0, 0), field.x, field.y);
 }
 
 cv::Point2d project_to_recorded_left(const StereoRig& rig, const Vec3& point_in_left_mm) {

@@ -37,6 +37,9 @@ StereoRig read_rig(const std::filesystem::path& calibration, TranslationUnit uni
 /// point far from the centre where none is named).
 void check_rig_fits(const StereoRig& rig, cv::Size video_size);
 
+/// Width and height of what the camera sees without distortion, degrees.
+cv::Point2d field_of_view_deg(const Camera& camera, cv::Size video_size);
+
 /// "baseline 4.14 mm, focal 1035 px, field of view 63 x 53 degrees"
 std::string describe_rig(const StereoRig& rig, cv::Size video_size);
 

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 #include "tests/app/program.h"
 
 namespace palpate::test {
@@ -22,6 +25,10 @@ class BadInput : public testing::Test {
     EXPECT_EQ(outcome.exit_code, 3) << outcome.error;
     EXPECT_FALSE(std::filesystem::exists(workspace_ / "out")) << "something half-written was left behind";
     EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    const auto answer = nlohmann::json::parse(outcome.output);
+    EXPECT_FALSE(answer["ok"].get<bool>());
+    EXPECT_EQ(answer["exit_code"].get<int>(), 3);
+    EXPECT_EQ("palpate: " + answer["error"].get<std::string>() + "\n", outcome.error);
     return outcome.error;
   }
 
@@ -112,6 +119,94 @@ TEST_F(BadInput, AMapFrameBeyondTheEndIsNamed) {
 TEST_F(BadInput, AnUnsetEnvironmentVariableInAPathIsNamed) {
   spoil_scene("left.avi", "'${PALPATE_NO_SUCH_FOLDER}/left.avi'");
   EXPECT_THAT(complaint(), HasSubstr("PALPATE_NO_SUCH_FOLDER"));
+}
+
+TEST_F(BadInput, AnOrganRegionOutsideTheImageIsNamedWithItsSizeAndThatOfTheImage) {
+  spoil_scene("[[40, 30], [300, 30], [300, 210], [40, 210]]", "[[400, 30], [900, 30], [900, 500], [400, 500]]");
+  EXPECT_THAT(complaint(),
+              AllOf(HasSubstr("scene.yaml: map.organ_region_px"), HasSubstr("(900, 500)"), HasSubstr("320x240")));
+}
+
+TEST_F(BadInput, AnOrganRegionAlongTheBorderIsFine) {
+  spoil_scene("[[40, 30], [300, 30], [300, 210], [40, 210]]", "[[0, 0], [320, 0], [320, 240], [-1, 240]]");
+  EXPECT_EQ(run_palpate("check " + in("scene.yaml").string()).exit_code, 0);
+}
+
+TEST_F(BadInput, TheSameFileForBothEyesIsNoticed) {
+  spoil_scene("right: right.avi", "right: ../in/left.avi");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("recording.left and recording.right are the same"), HasSubstr("left.avi")));
+}
+
+TEST_F(BadInput, AFolderInPlaceOfAVideoIsToldAsSuch) {
+  spoil_scene("left: left.avi", "left: .");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("recording.left"), HasSubstr("is a folder")));
+}
+
+TEST_F(BadInput, TheStageThatFailsIsToldWithTheSceneFile) {
+  spoil_scene("underside: {depth_mm: 3}", "sphere: {center_mm: [0, 0, 900], radius_mm: 5}");
+  EXPECT_THAT(complaint(), HasSubstr(in("scene.yaml").string() + ": attachments"));
+  write_file(in("calibration.yaml"), std::string("\0\1\2\xff", 4));
+  EXPECT_THAT(complaint(), HasSubstr(in("scene.yaml").string() + ": recording.calibration: "));
+}
+
+TEST_F(BadInput, AKeyOfTheDesignThatIsNotThereYetIsToldAsSuch) {
+  const std::string good = read_file(in("scene.yaml"));
+  for (const char* key : {"frames: [0, 9]", "register: true", "focus_px: [[1, 1], [2, 1], [2, 2]]",
+                          "focus: {radius_mm: 3}", "labels: {liver: {}}", "matcher: net.onnx"}) {
+    write_file(in("scene.yaml"), good);
+    spoil_scene("thickness_mm: 15", std::string("thickness_mm: 15, ") + key);
+    EXPECT_THAT(complaint(), AllOf(HasSubstr("scene.yaml:2: map."), HasSubstr("not available yet"))) << key;
+  }
+  for (const char* key : {"camera_from_robot: [1]", "time_offset_s: 1"}) {
+    write_file(in("scene.yaml"), good);
+    spoil_scene("segmentation: colour", key);
+    EXPECT_THAT(complaint(), AllOf(HasSubstr("instrument."), HasSubstr("not available yet"))) << key;
+  }
+  write_file(in("scene.yaml"), good);
+  spoil_scene("{segmentation: colour}", "[{segmentation: colour}, {segmentation: colour}]");
+  EXPECT_THAT(complaint(), HasSubstr("instrument[1] is not available yet"));
+}
+
+TEST_F(BadInput, AMissingTipTrackIsNoticedBeforeTheMapIsBuilt) {
+  spoil_scene("segmentation: colour", "track: none.csv");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("instrument.track"), HasSubstr("none.csv")));
+}
+
+TEST_F(BadInput, AMissingSceneFileIsNamedAsItWasGiven) {
+  const Outcome outcome = run_palpate("check no/such/scene.yaml");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_EQ(outcome.error, "palpate: no/such/scene.yaml does not exist, expected a YAML scene file\n");
+}
+
+TEST_F(BadInput, AnOutputFolderThatCannotBeMadeIsRefusedBeforeTheWorkBegins) {
+  const std::string file = in("left.avi").string();
+  write_file(in("simulated.yaml"),
+             "simulate: {gesture: [{approach_s: 1, at_px: [480, 270]}]}\ntissue: {preset: liver}\n");
+  const std::string before = read_file(file);
+  for (const std::string& folder : {file, file + "/deeper", std::string("/proc/palpate"), std::string("''")})
+    for (const std::string& verb : {"estimate " + in("scene.yaml").string(), "map " + in("scene.yaml").string(),
+                                    "simulate " + in("simulated.yaml").string(), std::string("demo")}) {
+      const Outcome outcome = run_palpate(verb + " -o " + folder);
+      EXPECT_EQ(outcome.exit_code, 3) << verb << " -o " << folder << ": " << outcome.error;
+      EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+      EXPECT_THAT(outcome.error, HasSubstr(folder == "''" ? "output folder" : folder));
+    }
+  EXPECT_EQ(read_file(file), before);
+}
+
+TEST_F(BadInput, AnImageThatSpoilsOnTheWayEndsWithFourAndKeepsWhatIsDone) {
+  for (int frame = 0; frame < 4; ++frame) {
+    cv::imwrite(in("l_" + std::to_string(frame) + ".png").string(), plane_pair(frame).left);
+    cv::imwrite(in("r_" + std::to_string(frame) + ".png").string(), plane_pair(frame).right);
+  }
+  write_file(in("r_2.png"), "no picture");
+  spoil_scene("left: left.avi, right: right.avi", "left: l_%d.png, right: r_%d.png");
+  const Outcome outcome =
+      run_palpate("estimate " + in("scene.yaml").string() + " -o " + (workspace_ / "out").string() + " --json");
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.error;
+  EXPECT_THAT(outcome.error, AllOf(HasSubstr("r_2.png"), HasSubstr("2 frames are kept")));
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["exit_code"].get<int>(), 4);
+  EXPECT_TRUE(std::filesystem::exists(workspace_ / "out/report.html"));
 }
 
 TEST_F(BadInput, AMissingTruthFileIsNoticedBeforeAnythingRuns) {

@@ -35,6 +35,37 @@ TEST(Program, EveryVerbHasHelpWithAnExample) {
   }
 }
 
+TEST(Program, HelpSaysWhereAPathIsMeant) {
+  EXPECT_THAT(run_palpate("estimate --help").output,
+              testing::AllOf(HasSubstr("scene SCENE"), HasSubstr("FOLDER"), HasSubstr("--truth FILE")));
+  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check"})
+    EXPECT_THAT(run_palpate(std::string(verb) + " --help").output, testing::Not(HasSubstr("TEXT"))) << verb;
+}
+
+TEST(Program, WrongUseIsAlsoAnsweredInJson) {
+  const Outcome outcome = run_palpate("estimate --json");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["exit_code"].get<int>(), 2);
+}
+
+TEST(Program, CheckTellsWhatItReadInJson) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 3);
+  const Outcome outcome = run_palpate("check " + (workspace / "in/scene.yaml").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_TRUE(json["ok"].get<bool>());
+  EXPECT_EQ(json["recording"]["image_size_px"], nlohmann::json({320, 240}));
+  EXPECT_EQ(json["recording"]["fps"], 25);
+  EXPECT_EQ(json["recording"]["frames"], 3);
+  EXPECT_EQ(json["calibration"]["focal_px"], 300);
+  EXPECT_EQ(json["calibration"]["baseline_mm"], 5);
+  EXPECT_NEAR(json["calibration"]["field_of_view_deg"][0], 2 * std::atan(160. / 300) * 180 / M_PI, 1e-9);
+  EXPECT_EQ(json["attachments"], nlohmann::json({"underside"}));
+  EXPECT_EQ(json["tissue"]["law"], "saint-venant-kirchhoff");
+  EXPECT_EQ(json["tissue"]["young_modulus_kPa"], 27);
+}
+
 TEST(Program, VerbsThatAreNotThereYetSaySoAndEndWithTwo) {
   for (const char* verb : {"study some.yaml", "console"}) {
     const Outcome outcome = run_palpate(verb);
@@ -57,7 +88,9 @@ TEST(Program, MapWritesEveryFileOfTheContract) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
   for (const char* name : {"map.vtu", "surface.ply", "cloud.ply", "preview.png", "map.json"})
     EXPECT_TRUE(std::filesystem::exists(workspace / "out" / name)) << name;
-  EXPECT_TRUE(nlohmann::json::accept(outcome.output));
+  const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_TRUE(json["ok"].get<bool>());
+  EXPECT_EQ(json["folder"], (workspace / "out").string());
   EXPECT_FALSE(cv::imread((workspace / "out/preview.png").string()).empty());
 }
 
@@ -73,6 +106,12 @@ TEST(Program, AVideoWithoutInstrumentIsToolLostInEveryFrame) {
     EXPECT_EQ(row.status, "tool_lost");
     EXPECT_EQ(row.force_magnitude_N, 0);
   }
+  const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_TRUE(json["ok"].get<bool>());
+  EXPECT_EQ(json["folder"], (workspace / "out").string());
+  EXPECT_EQ(json["tissue"]["poisson_ratio"], 0.45);
+  EXPECT_EQ(json["peak_force_per_modulus_N_per_kPa"], 0);
+  EXPECT_EQ(json["frames_by_status"]["tool_lost"], 4);
   EXPECT_EQ(frames_in(workspace / "out/overlay.mp4"), 4);
   EXPECT_THAT(read_file(workspace / "out/run.yaml"), HasSubstr("thickness_mm: 15"));
 }
@@ -123,6 +162,7 @@ TEST(Program, TheDemoMeetsItsGoals) {
   const Outcome outcome = run_palpate("demo -o " + (workspace / "demo").string() + " --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
   const auto json = nlohmann::json::parse(outcome.output);
+  EXPECT_NEAR(json["peak_force_per_modulus_N_per_kPa"].get<double>(), json["peak_force_N"].get<double>() / 400, 1e-9);
   EXPECT_GE(json["frames"].get<int>(), 100);
   const auto& figures = json["comparison"];
   EXPECT_EQ(figures["missing_frames"].get<int>(), 0);

@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cstdlib>
+#include <fstream>
 
 #include "palpate/core/errors.h"
 
@@ -22,9 +23,21 @@ struct Options {
   std::filesystem::path file;
   std::vector<cv::Point2d> region;
   std::vector<double> radii;
+  std::string label = "fruit";
 };
 
+void describe_basket(Settings& basket, Options& options) {
+  basket.text("label", options.label, "label");
+  basket.not_yet({"[1]"});
+  basket.after_reading([&options] {
+    if (options.label == "none") throw BadInput("basket needs a label");
+    if (options.label == "wet") throw BadInput("the label is wet");
+  });
+}
+
 void describe(Settings& settings, Options& options) {
+  settings.group("basket", "what holds it", [&options](Settings& basket) { describe_basket(basket, options); });
+  settings.not_yet({"ripeness"});
   settings.number("thickness_mm", options.thickness_mm, {0, 500, true, false}, "depth");
   settings.integer("elements", options.elements, {100, 1e6}, "count");
   settings.choice<Fruit>("fruit", options.fruit, {{"apple", Fruit::apple}, {"pear", Fruit::pear}}, "kind");
@@ -85,29 +98,95 @@ TEST(Settings, WhatIsWrittenReadsBackAsTheSame) {
 
 TEST(Settings, AMisspeltKeyIsNamedWithItsLineAndTheNearestValidOne) {
   EXPECT_EQ(complaint("elements: 200\nthicknes_mm: 20\n"),
-            "scene.yaml:2: thicknes_mm is not a known key; did you mean 'thickness_mm'?");
+            "folder/scene.yaml:2: thicknes_mm is not a known key; did you mean 'thickness_mm'?");
 }
 
 TEST(Settings, AValueOutOfRangeIsNamedWithWhatWasExpected) {
-  EXPECT_EQ(complaint("thickness_mm: 0\n"), "scene.yaml:1: thickness_mm is 0, expected 0 < x <= 500");
-  EXPECT_EQ(complaint("elements: 550.5\n"), "scene.yaml:1: elements is 550.5, expected a whole number");
+  EXPECT_EQ(complaint("thickness_mm: 0\n"), "folder/scene.yaml:1: thickness_mm is 0, expected 0 < x <= 500");
+  EXPECT_EQ(complaint("elements: 550.5\n"), "folder/scene.yaml:1: elements is 550.5, expected a whole number");
   EXPECT_EQ(complaint("spheres: [{radius_mm: 2}, {radius_mm: 10}]\n"),
-            "scene.yaml:1: spheres[1].radius_mm is 10, expected 0 <= x <= 9");
+            "folder/scene.yaml:1: spheres[1].radius_mm is 10, expected 0 <= x <= 9");
 }
 
 TEST(Settings, AValueOfTheWrongKindIsNamed) {
   EXPECT_EQ(complaint("thickness_mm: thick\n"),
-            "scene.yaml:1: thickness_mm is 'thick', expected a number 0 < x <= 500");
-  EXPECT_EQ(complaint("thickness_mm: .nan\n"), "scene.yaml:1: thickness_mm is '.nan', expected a number 0 < x <= 500");
+            "folder/scene.yaml:1: thickness_mm is 'thick', expected a number 0 < x <= 500");
+  EXPECT_EQ(complaint("thickness_mm: .nan\n"),
+            "folder/scene.yaml:1: thickness_mm is '.nan', expected a number 0 < x <= 500");
   EXPECT_EQ(complaint("fruit: paer\n"),
-            "scene.yaml:1: fruit is 'paer', expected one of: apple, pear; did you mean 'pear'?");
-  EXPECT_EQ(complaint("center_mm: [1, 2]\n"), "scene.yaml:1: center_mm is a list, expected a list of 3 numbers");
+            "folder/scene.yaml:1: fruit is 'paer', expected one of: apple, pear; did you mean 'pear'?");
+  EXPECT_EQ(complaint("center_mm: [1, 2]\n"), "folder/scene.yaml:1: center_mm is a list, expected a list of 3 numbers");
   EXPECT_EQ(complaint("region_px: [[1, 2], [3, 4]]\n"),
-            "scene.yaml:1: region_px is a list, expected at least three corners [[x, y], ...]");
+            "folder/scene.yaml:1: region_px is a list, expected at least three corners [[x, y], ...]");
 }
 
 TEST(Settings, AKeyThatStandsTwiceIsAnError) {
-  EXPECT_EQ(complaint("elements: 200\nelements: 300\n"), "scene.yaml:2: elements stands there twice, expected once");
+  EXPECT_EQ(complaint("elements: 200\nelements: 300\n"),
+            "folder/scene.yaml:2: elements stands there twice, expected once");
+}
+
+TEST(Settings, AKeyOfALaterVersionIsRefusedAsSuch) {
+  EXPECT_EQ(complaint("elements: 200\nripeness: 3\n"),
+            "folder/scene.yaml:2: ripeness is not available yet in this version");
+  EXPECT_EQ(complaint("basket: [{label: a}, {label: b}]\n"),
+            "folder/scene.yaml:1: basket[1] is not available yet in this version");
+  EXPECT_EQ(complaint("fruit: pear.onnx\n"),
+            "folder/scene.yaml:1: fruit is 'pear.onnx'; networks are not available yet in this version, expected one "
+            "of: apple, pear");
+}
+
+TEST(Settings, ASentenceOfAGroupNamesTheGroupOnce) {
+  EXPECT_EQ(complaint("basket: {label: none}\n"), "folder/scene.yaml:1: basket needs a label");
+  EXPECT_EQ(complaint("basket: {label: wet}\n"), "folder/scene.yaml:1: basket: the label is wet");
+}
+
+TEST(Settings, WhatAFileSaysIsToldOnOneShortLine) {
+  const std::string long_word(500, 'x');
+  EXPECT_EQ(complaint("elements: \"1\\n2\"\n"),
+            "folder/scene.yaml:1: elements is '1 2', expected a number 100 <= x <= 1000000");
+  EXPECT_LT(complaint("elements: " + long_word + "\n").size(), 200u);
+  EXPECT_LT(complaint(long_word + ": 1\n").size(), 250u);
+}
+
+/// The sentence about a file with this content.
+std::string complaint_about_file(const std::string& content) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "palpate_settings_test.yaml";
+  std::ofstream(file) << content;
+  Options options;
+  Settings settings;
+  describe(settings, options);
+  std::string sentence = "nothing";
+  try {
+    read_settings_file(file, settings);
+  } catch (const BadInput& error) {
+    sentence = error.what();
+  }
+  std::filesystem::remove(file);
+  return sentence.substr(sentence.find("palpate_settings_test.yaml"));
+}
+
+TEST(Settings, AFileThatIsNoTextIsNotEchoed) {
+  EXPECT_EQ(complaint_about_file(std::string("\x7f"
+                                             "ELF\x02\x01\0\0\x03 \xff\xfe",
+                                             13)),
+            "palpate_settings_test.yaml is no text, expected a YAML scene file");
+  EXPECT_EQ(complaint_about_file(""), "palpate_settings_test.yaml is empty, expected a YAML scene file");
+  EXPECT_THAT(complaint_about_file("elements: [1\n"),
+              testing::StartsWith("palpate_settings_test.yaml:2: not valid YAML"));
+}
+
+TEST(Settings, AMissingFileAndAFolderAreTold) {
+  Settings settings;
+  const auto sentence = [&settings](const std::string& file) {
+    try {
+      read_settings_file(file, settings);
+    } catch (const BadInput& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(sentence("nowhere/scene.yaml"), "nowhere/scene.yaml does not exist, expected a YAML scene file");
+  EXPECT_EQ(sentence("/"), "/ is a folder, expected a YAML scene file");
 }
 
 TEST(Settings, PathsTakeTheEnvironmentAndSayWhichVariableIsMissing) {

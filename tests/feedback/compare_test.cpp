@@ -91,6 +91,45 @@ TEST_F(Compare, GivesTheFiguresOfTheReferenceScorer) {
   EXPECT_EQ(seen, expected.size());
 }
 
+TEST_F(Compare, GivesTheFiguresOfTheReferenceScorerForAFileThatIsAMess) {
+  const std::string truth =
+      "frame,in_contact,fx_N,fy_N,fz_N,force_N,tip_x_mm,tip_y_mm,tip_z_mm\n"
+      "10,0,0,0,0,0,1,2,80\n11,1,0,0,-2,2,1,2,81\n12,1,0,0,-4,4,1,2,82\n13,0,0,0,0,0,1,2,80\n14,0,0,0,0,0,,,\n";
+  // Columns in another order, a quoted text, a field that is no number, a row twice, a row that ends early.
+  const std::string estimate =
+      "note,tip_z_mm,tip_y_mm,tip_x_mm,force_N,fz_N,fy_N,fx_N,in_contact,frame\r\n"
+      "\"a, \"\"b\"\"\",80.5,2,1,0,0,0,0,0,10\r\n"
+      ",81,2,1,9,-9,0,0,1,11\r\n"
+      "\r\n"
+      ",81,2,1.3,1.5,-1.5,oops,0,1,11.0\r\n"
+      ",nan,2,1,nan,-3,0,0,1,12\r\n"
+      ",80,2,1,0.03,0,0,0.03,,13\r\n"
+      ",80,2,1,0,0,0,0,nan,+14\r\n";
+  // Printed by the reference scorer for the same two files.
+  const Comparison c = compared(estimate, truth);
+  EXPECT_EQ(c.frames, 5);
+  EXPECT_EQ(c.missing_frames, 0);
+  EXPECT_DOUBLE_EQ(c.est_peak_N, 1.5);
+  EXPECT_NEAR(c.force_rmse_N, 1.8028255600584324, 1e-12);
+  EXPECT_NEAR(*c.gain, 0.15, 1e-12);
+  EXPECT_NEAR(*c.vector_rmse_N, 0.5001799676116587, 1e-12);
+  EXPECT_NEAR(*c.force_correlation, 0.24367244841449892, 1e-12);
+  EXPECT_EQ(c.false_contact_frames, 0);
+  EXPECT_EQ(c.missed_contact_frames, 0);
+  EXPECT_EQ(*c.release_error_frames, 0);
+  EXPECT_DOUBLE_EQ(c.false_force_max_N, 0.03);
+  EXPECT_EQ(c.tip_frames, 3);
+  EXPECT_NEAR(*c.tip_rmse_mm, 0.33665016461206926, 1e-12);
+}
+
+TEST_F(Compare, LeavesVectorsOpenForATruthThatKnowsTheMagnitudeOnly) {
+  const Comparison c = compared("frame,force_N\n0,1\n1,2\n", "frame,force_N\n0,0\n1,2\n");
+  EXPECT_DOUBLE_EQ(c.force_rmse_N, std::sqrt(0.5));
+  EXPECT_FALSE(c.vector_rmse_N.has_value());
+  EXPECT_FALSE(c.direction_error_deg_median.has_value());
+  EXPECT_FALSE(c.true_onset_frame.has_value());
+}
+
 TEST_F(Compare, OfTheTruthWithItselfIsPerfect) {
   const Comparison c = compared(kTruth, kTruth);
   EXPECT_EQ(c.force_rmse_N, 0);

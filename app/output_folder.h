@@ -1,0 +1,11 @@
+#pragma once
+
+#include <filesystem>
+
+namespace palpate::app {
+
+/// Finds out, before any work, whether results can be written into `folder`, which need not exist; leaves nothing
+/// behind. Throws BadInput.
+void require_output_folder(const std::filesystem::path& folder);
+
+}  // namespace palpate::app

@@ -1,0 +1,32 @@
+#include "palpate/feedback/warnings.h"
+
+#include <sstream>
+
+namespace palpate {
+
+const std::vector<std::pair<std::string, std::string>>& known_warnings() {
+  static const std::vector<std::pair<std::string, std::string>> kWarnings = {
+      {"law_out_of_range", "tissue deformed beyond the law's range"},
+      {"inverted_elements", "elements of the map turned inside out"},
+      {"near_attachment", "contact close to where the tissue is held"},
+      {"sliding", "the tip slides over the tissue"},
+  };
+  return kWarnings;
+}
+
+std::string warning_words(const std::string& name) {
+  for (const auto& [known, words] : known_warnings())
+    if (known == name) return words;
+  return name;
+}
+
+std::map<std::string, int> count_warnings(const std::vector<ForceRow>& rows) {
+  std::map<std::string, int> frames;
+  for (const ForceRow& row : rows) {
+    std::istringstream names(row.warnings);
+    for (std::string name; std::getline(names, name, ';');) ++frames[name];
+  }
+  return frames;
+}
+
+}  // namespace palpate
