@@ -13,7 +13,9 @@
 namespace {
 
 /// One sentence on standard error; with --json also one object on standard output.
-int fail(const std::string& sentence, int exit_code, bool json) {
+int fail(std::string sentence, int exit_code, bool json) {
+  for (char& c : sentence)  // what a file says may stand in it
+    if (static_cast<unsigned char>(c) < ' ') c = ' ';
   fmt::print(stderr, "palpate: {}\n", sentence);
   if (json) fmt::print("{}", palpate::app::json_failure(sentence, exit_code));
   return exit_code;

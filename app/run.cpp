@@ -98,8 +98,9 @@ class PictureChoice {
 
  private:
   static std::string caption(const ForceEstimate& estimate) {
-    return fmt::format("frame {}, {:.2f} s, {}, {:.2f} N", estimate.frame, estimate.time_s,
-                       status_name(estimate.status), estimate.force_N.norm());
+    const std::string force = estimate.in_contact ? fmt::format(", {:.2f} N", estimate.force_N.norm()) : "";
+    return fmt::format("frame {}, {:.2f} s, {}{}", estimate.frame, estimate.time_s, status_name(estimate.status),
+                       force);
   }
 
   struct Offered {
@@ -176,6 +177,25 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   summary.frames_by_warning = count_warnings(files.rows);
   if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_truth(files.options.truth));
   return summary;
+}
+
+std::string text_line(const std::string& name, const std::string& value) {
+  return fmt::format("{:<22}{}\n", name, value);
+}
+
+std::string text_of_comparison(const Comparison& c) {
+  std::string text;
+  const auto line = [&text](const std::string& name, const std::string& value) { text += text_line(name, value); };
+  line("true peak force", fmt::format("{:.2f} N", c.true_peak_N));
+  line("force RMSE", fmt::format("{:.3f} N", c.force_rmse_N));
+  if (c.force_nrmse_pct) line("force NRMSE", fmt::format("{:.1f} % of the true peak", *c.force_nrmse_pct));
+  if (c.direction_error_deg_median)
+    line("direction error", fmt::format("{:.1f} degrees median", *c.direction_error_deg_median));
+  if (c.onset_error_frames) line("onset error", fmt::format("{:+d} frames", *c.onset_error_frames));
+  if (c.release_error_frames) line("release error", fmt::format("{:+d} frames", *c.release_error_frames));
+  line("false contact", fmt::format("{} frames", c.false_contact_frames));
+  if (c.tip_rmse_mm) line("tip RMSE", fmt::format("{:.2f} mm", *c.tip_rmse_mm));
+  return text;
 }
 
 double force_per_modulus_N_per_kPa(const RunSummary& summary) {
@@ -270,9 +290,7 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
 
 std::string to_text(const RunSummary& summary) {
   std::string text;
-  const auto line = [&text](const std::string& name, const std::string& value) {
-    text += fmt::format("{:<22}{}\n", name, value);
-  };
+  const auto line = [&text](const std::string& name, const std::string& value) { text += text_line(name, value); };
   std::string statuses;
   for (const auto& [status, count] : summary.frames_by_status)
     statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
@@ -285,20 +303,12 @@ std::string to_text(const RunSummary& summary) {
                                      tissue.poisson_ratio));
   line("peak force", fmt::format("{:.2f} N, that is {:.3g} N per kPa of E", summary.peak_force_N,
                                  force_per_modulus_N_per_kPa(summary)));
+  if (summary.frames_by_status.count("tool_lost") && summary.frames_by_status.size() == 1)
+    line("instrument", "not seen in any frame");
   for (const auto& [name, frames] : summary.frames_by_warning)
     line("warning", fmt::format("{} frames: {} ({})", frames, warning_words(name), name));
+  if (summary.comparison) text += text_of_comparison(*summary.comparison);
   line("written to", summary.folder.string());
-  if (!summary.comparison) return text;
-  const Comparison& c = *summary.comparison;
-  line("true peak force", fmt::format("{:.2f} N", c.true_peak_N));
-  line("force RMSE", fmt::format("{:.3f} N", c.force_rmse_N));
-  if (c.force_nrmse_pct) line("force NRMSE", fmt::format("{:.1f} % of the true peak", *c.force_nrmse_pct));
-  if (c.direction_error_deg_median)
-    line("direction error", fmt::format("{:.1f} degrees median", *c.direction_error_deg_median));
-  if (c.onset_error_frames) line("onset error", fmt::format("{:+d} frames", *c.onset_error_frames));
-  if (c.release_error_frames) line("release error", fmt::format("{:+d} frames", *c.release_error_frames));
-  line("false contact", fmt::format("{} frames", c.false_contact_frames));
-  if (c.tip_rmse_mm) line("tip RMSE", fmt::format("{:.2f} mm", *c.tip_rmse_mm));
   return text;
 }
 

@@ -20,6 +20,9 @@ namespace {
 const cv::Scalar kMeshColour{240, 220, 120}, kFixedColour{70, 130, 255};
 constexpr int kPanelWidth_px = 800;
 constexpr double kPanelScale = 1.2;
+/// Beside its panel: on it, the bar would hide the map.
+constexpr int kBarWidth_px = 100, kBarHeight_px = 260;
+const cv::Scalar kBackground{32, 28, 26};
 
 /// Distance from a pixel to the nearest edge of its triangle, px: a weight times the triangle's height over that edge.
 double edge_distance_px(const Triangle& corners, const std::vector<ScreenVertex>& vertices, const cv::Vec2f& weights) {
@@ -123,7 +126,7 @@ std::pair<double, double> middle_range(const cv::Mat& values) {
   return {least, std::max(most, least + 1e-3 * std::max(1.0, std::abs(least)))};
 }
 
-/// The rectified image in grey, coloured where there is a value.
+/// The rectified image in grey, coloured where there is a value; its colour bar at the right.
 cv::Mat draw_value_panel(const cv::Mat& rectified_bgr, const cv::Mat& values, bool from_zero,
                          const std::string& title) {
   cv::Mat grey, image;
@@ -137,10 +140,12 @@ cv::Mat draw_value_panel(const cv::Mat& rectified_bgr, const cv::Mat& values, bo
       if (const float value = values.at<float>(y, x); std::isfinite(value))
         blend(image.at<cv::Vec3b>(y, x), colour_at(table, (value - least) / (most - least)), 0.85);
   cv::Mat panel = panel_of(image);
-  draw_colour_bar(panel, {panel.cols - 100, 0, 100, std::min(panel.rows, 260)}, table, {least, most, "mm"},
-                  kPanelScale);
   draw_title(panel, title);
-  return panel;
+  cv::Mat bar(panel.rows, kBarWidth_px, CV_8UC3, kBackground), both;
+  draw_colour_bar(bar, {0, 0, kBarWidth_px, std::min(bar.rows, kBarHeight_px)}, table, {least, most, "mm"},
+                  kPanelScale);
+  cv::hconcat(panel, bar, both);
+  return both;
 }
 
 cv::Mat depth_mm(const Rectification& rectification, const cv::Mat& disparity_px) {
@@ -166,7 +171,7 @@ cv::Mat depth_deviation_mm(const Rectification& rectification, const cv::Mat& de
 
 /// Orthographic, seen along +x: depth runs to the right (the camera is at the left), y runs down.
 cv::Mat draw_side_panel(const TissueMap& map, const std::vector<Triangle>& boundary, const cv::Size& size) {
-  cv::Mat panel(size, CV_8UC3, cv::Scalar(32, 28, 26));
+  cv::Mat panel(size, CV_8UC3, kBackground);
   const std::vector<Vec3>& nodes = map.mesh.nodes_mm;
   if (!nodes.empty()) {
     Vec3 least = nodes.front(), most = nodes.front();

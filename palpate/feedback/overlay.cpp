@@ -14,11 +14,12 @@
 
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/draw.h"
+#include "palpate/feedback/warnings.h"
 
 namespace palpate {
 namespace {
 
-const cv::Scalar kGood{110, 210, 90}, kIdle{190, 190, 190}, kDoubt{60, 180, 250};
+const cv::Scalar kGood{110, 210, 90}, kIdle{190, 190, 190}, kDoubt{60, 180, 250}, kCaution{60, 225, 250};
 
 /// The colour bar begins at the stress of this strain, so that noise does not fill it.
 constexpr double kStrainOfLowestScale = 0.02;
@@ -269,17 +270,20 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
 void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate) const {
   const double scale = drawing_scale(image.size());
   const auto px = [scale](double size) { return cvRound(size * scale); };
-  const auto [words, colour] = words_of(estimate.status);
+  const auto [words, status_colour] = words_of(estimate.status);
+  std::vector<std::string> warnings;
+  for (const std::string& name : estimate.warnings) warnings.push_back(warning_words(name));
+  const bool caution = !warnings.empty() && status_colour != kDoubt;
   const std::string time = fmt::format("{:.2f} s   frame {}", estimate.time_s, estimate.frame);
   int width = std::max(text_width(words, 11 * scale) + px(20), text_width(time, 8 * scale));
-  for (const std::string& warning : estimate.warnings) width = std::max(width, text_width(warning, 8 * scale));
-  const int warning_lines = static_cast<int>(estimate.warnings.size());
+  for (const std::string& warning : warnings) width = std::max(width, text_width(warning, 8 * scale));
+  const int warning_lines = static_cast<int>(warnings.size());
   draw_veil(image, {px(8), px(8), width + px(20), px(46 + 15 * warning_lines)});
-  cv::circle(image, {px(23), px(23)}, px(5), colour, cv::FILLED, cv::LINE_AA);
+  cv::circle(image, {px(23), px(23)}, px(5), caution ? kCaution : status_colour, cv::FILLED, cv::LINE_AA);
   draw_text(image, words, {px(36), px(28)}, 11 * scale, kInk);
   draw_text(image, time, {px(18), px(46)}, 8 * scale, kFaintInk);
   for (int i = 0; i < warning_lines; ++i)
-    draw_text(image, estimate.warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kDoubt);
+    draw_text(image, warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kCaution);
 
   const std::string greatest =
       stress_is_trusted(estimate) ? "max " + three_digits(estimate.max_von_mises_kPa) : "max -";

@@ -14,8 +14,10 @@
 #include "palpate/core/errors.h"
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/compare.h"
+#include "palpate/feedback/quantile.h"
 #include "palpate/feedback/report_page.h"
 #include "palpate/feedback/svg_chart.h"
+#include "palpate/feedback/warnings.h"
 
 namespace palpate {
 namespace {
@@ -32,12 +34,6 @@ std::string base64(const std::vector<uchar>& bytes) {
     for (unsigned k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 63];
   }
   return text;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(std::lround(share * static_cast<double>(values.size() - 1)))];
 }
 
 bool has_answer(const ForceRow& row) {
@@ -121,14 +117,32 @@ std::string cards(const Report& report, const std::optional<Comparison>& compari
   std::vector<double> frame_ms;
   for (const ForceRow& row : report.rows) frame_ms.push_back(row.frame_ms);
   html += card(fmt::format("{:.1f} ms", quantile(frame_ms, 0.5)),
-               fmt::format("per frame (median; 95 %: {:.1f} ms)", quantile(frame_ms, 0.95)));
+               fmt::format("per frame (median; 99 %: {:.1f} ms)", quantile(frame_ms, 0.99)));
+  const bool has_ratio = peak_N > 0 && report.tissue.young_modulus_kPa > 0;
+  const std::string ratio = has_ratio ? fmt::format("at the peak F/E = {} mm&sup2;; ",
+                                                    three_digits(peak_N / report.tissue.young_modulus_MPa()))
+                                      : "";
   return "<div class=\"cards\">" + html + "</div>\n" +
          fmt::format(
              "<p class=\"note\">Tissue assumed: {}, E = {} kPa, &nu; = {}. The force is proportional to the "
-             "Young&rsquo;s modulus assumed: at the peak F/E = {} mm&sup2;. Twice the modulus, twice the force.</p>\n",
+             "Young&rsquo;s modulus assumed: {}twice the modulus, twice the force.</p>\n",
              law_name(report.tissue.law), tick_text(report.tissue.young_modulus_kPa),
-             tick_text(report.tissue.poisson_ratio),
-             report.tissue.young_modulus_kPa > 0 ? three_digits(peak_N / report.tissue.young_modulus_MPa()) : "-");
+             tick_text(report.tissue.poisson_ratio), ratio);
+}
+
+/// What a reader must know before the curves.
+std::string notes(const std::vector<ForceRow>& rows) {
+  std::string html;
+  const bool never_seen =
+      std::all_of(rows.begin(), rows.end(), [](const ForceRow& r) { return r.status == "tool_lost"; });
+  if (!rows.empty() && never_seen)
+    html += "<p class=\"note\">No instrument was seen in any frame: there is no contact and no force.</p>\n";
+  std::string items;
+  for (const auto& [name, frames] : count_warnings(rows))
+    items += fmt::format("<li>{} <span class=\"faint\">({} of {} frames, <code>{}</code>)</span></li>",
+                         escape_html(warning_words(name)), frames, rows.size(), escape_html(name));
+  if (!items.empty()) html += "<div class=\"note caution\">Warnings<ul>" + items + "</ul></div>\n";
+  return html;
 }
 
 std::string force_section(const Report& report) {
@@ -189,7 +203,7 @@ std::string times_table(const std::vector<FrameTimes>& times) {
   std::string rows;
   const auto add = [&](const char* name, const std::vector<double>& ms) {
     rows += fmt::format("<tr><td>{}</td><td class=\"number\">{:.2f}</td><td class=\"number\">{:.2f}</td></tr>", name,
-                        quantile(ms, 0.5), quantile(ms, 0.95));
+                        quantile(ms, 0.5), quantile(ms, 0.99));
   };
   std::vector<double> ms(times.size());
   for (const auto& [name, stage] : stages) {
@@ -200,7 +214,7 @@ std::string times_table(const std::vector<FrameTimes>& times) {
   add("whole frame", ms);
   return "<div><h2>Time per frame (ms)</h2><div class=\"scroll\"><table><tr><th>stage</th><th "
          "class=\"number\">median</th>"
-         "<th class=\"number\">95 %</th></tr>" +
+         "<th class=\"number\">99 %</th></tr>" +
          rows + "</table></div></div>\n";
 }
 
@@ -225,6 +239,7 @@ std::string report_html(const Report& report) {
                      "</h1>\n<p class=\"faint\">Palpate: force and stress from a "
                      "stereo endoscope. Research use only, not a medical device.</p>\n";
   body += cards(report, comparison);
+  body += notes(report.rows);
   body += force_section(report);
   if (!report.pictures.empty()) body += picture_section(report.pictures);
   body += tip_section(report);

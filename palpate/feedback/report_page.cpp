@@ -5,7 +5,7 @@ namespace {
 
 constexpr const char* kStyle = R"css(
 :root{--paper:#fff;--panel:#f5f7f8;--ink:#15202b;--faint:#5b6875;--line:#d9dfe4;--estimate:#0a6ebd;--truth:#d1650a;
---good:#2e9e5b;--idle:#b8c2cb;--doubt:#c43e6a}
+--good:#2e9e5b;--idle:#b8c2cb;--doubt:#c43e6a;--caution:#d9a400}
 @media (prefers-color-scheme:dark){:root{--paper:#12171c;--panel:#1b222a;--ink:#e8edf2;--faint:#9aa7b4;--line:#33404c;
 --estimate:#58b4ff;--truth:#ffab5c;--good:#49c97f;--idle:#4b5864;--doubt:#ff7da3}}
 *{box-sizing:border-box}
@@ -20,6 +20,7 @@ p{margin:.5em 0}
 .card b{display:block;font-size:1.35rem;font-weight:650;white-space:nowrap}
 .card span{color:var(--faint);font-size:.82rem}
 .note{border-left:3px solid var(--estimate);background:var(--panel);padding:10px 14px;border-radius:0 8px 8px 0}
+.caution{border-color:var(--caution);margin:.5em 0}.caution ul{margin:.2em 0;padding-left:1.3em}
 .chart svg{display:block;width:100%;height:auto;touch-action:pan-y}
 .chart .narrow{display:none}
 .chart{margin:0 0 8px}

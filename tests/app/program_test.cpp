@@ -4,8 +4,13 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
 
 #include "palpate/feedback/forces_file.h"
+#include "palpate/feedback/warnings.h"
+#include "palpate/stereo/rig.h"
 #include "tests/app/program.h"
 #include "tests/support/reference_data.h"
 
@@ -188,6 +193,49 @@ TEST(Program, TheScenePageIsWhatTheProgramSaysOfItself) {
   const Outcome outcome = run_palpate("--document-scene");
   ASSERT_EQ(outcome.exit_code, 0);
   EXPECT_THAT(page, HasSubstr(outcome.output)) << "docs/scene.md is behind: run ./dev docs";
+}
+
+/// Every name that a line of the library adds to the warnings of a frame.
+std::set<std::string> warnings_in_the_code() {
+  static const std::regex kAdded("warnings\\.(push_back|emplace_back)\\(\"([a-z_]+)\"\\)");
+  std::set<std::string> names;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(std::filesystem::path(PALPATE_SOURCE_DIR) / "palpate")) {
+    if (entry.path().extension() != ".cpp") continue;
+    const std::string source = read_file(entry.path());
+    for (std::sregex_iterator found(source.begin(), source.end(), kAdded), end; found != end; ++found)
+      names.insert((*found)[2]);
+  }
+  return names;
+}
+
+TEST(ResultsPage, NamesEveryColumnStatusAndWarning) {
+  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/results.md");
+  const std::set<std::string> warnings = warnings_in_the_code();
+  ASSERT_TRUE(warnings.count("law_out_of_range"));
+  for (const std::string& name : warnings) {
+    EXPECT_THAT(page, HasSubstr("| `" + name + "` | " + warning_words(name)));
+    EXPECT_NE(warning_words(name), name) << "has no words in palpate/feedback/warnings.cpp";
+  }
+  for (const FrameStatus status : {FrameStatus::ok, FrameStatus::no_contact, FrameStatus::tool_lost,
+                                   FrameStatus::not_converged, FrameStatus::map_stale})
+    EXPECT_THAT(page, HasSubstr("| `" + status_name(status) + "`"));
+  const Workspace workspace;
+  { const ForcesWriter header_only(workspace / "forces.csv"); }
+  std::stringstream columns(read_file(workspace / "forces.csv"));
+  for (std::string column; std::getline(columns, column, ',');)
+    EXPECT_THAT(page, HasSubstr("`" + column.substr(0, column.find('\n')) + "`"));
+}
+
+TEST(ScenePage, ShowsACalibrationThatIsRead) {
+  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/scene.md");
+  const size_t begin = page.find("%YAML:1.0");
+  ASSERT_NE(begin, std::string::npos);
+  const Workspace workspace;
+  write_file(workspace / "calibration.yaml", page.substr(begin, page.find("```", begin) - begin));
+  const StereoRig rig = read_rig(workspace / "calibration.yaml");
+  EXPECT_EQ(rig.baseline_mm(), 5);
+  EXPECT_EQ(rig.image_size, cv::Size(960, 540));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ namespace palpate {
 namespace {
 
 const cv::Size kSize(800, 450);
+constexpr int kBarWidth_px = 100;
 
 Rectification rectification() {
   StereoRig rig;
@@ -47,7 +48,7 @@ double brightness(const cv::Mat& image, const cv::Rect& area) {
 TEST(MapPreview, HasFourPanels) {
   const cv::Mat preview =
       draw_map_preview(cv::Mat(kSize, CV_8UC3, cv::Scalar(40, 40, 120)), rectification(), box_map());
-  EXPECT_EQ(preview.size(), cv::Size(2 * kSize.width, 2 * kSize.height));
+  EXPECT_EQ(preview.size(), cv::Size(2 * kSize.width + kBarWidth_px, 2 * kSize.height));
 }
 
 TEST(MapPreview, DrawsTheWireframeOnTheMeshOnly) {
@@ -70,6 +71,15 @@ TEST(MapPreview, ColoursDepthWhereItWasMeasured) {
   const cv::Rect depth(kSize.width, 0, kSize.width, kSize.height);
   EXPECT_GT(brightness(preview(depth), {300, 200, 50, 50}), 20);
   EXPECT_EQ(brightness(preview(depth), {150, 200, 50, 50}), 0);
+}
+
+TEST(MapPreview, ShowsDepthUpToTheBorderOfTheImage) {
+  TissueMap map = box_map();
+  map.disparity.disparity_px.setTo(30);
+  const cv::Mat preview = draw_map_preview(cv::Mat(kSize, CV_8UC3, cv::Scalar::all(0)), rectification(), map);
+  const cv::Vec3b middle = preview.at<cv::Vec3b>(200, kSize.width + 400);
+  for (int y = 1; y < kSize.height - 1; ++y)
+    ASSERT_EQ(preview.at<cv::Vec3b>(y, 2 * kSize.width - 2), middle) << "row " << y << " is hidden";
 }
 
 TEST(MapPreview, SurvivesAMapWithoutAnything) {

@@ -245,5 +245,16 @@ TEST(Overlay, RefusesAnImageOfAnotherSize) {
   EXPECT_THROW(painter.paint(cv::Mat(100, 100, CV_8UC3), {}), std::invalid_argument);
 }
 
+TEST(Overlay, TurnsTheStatusDotYellowWhereThereIsAWarning) {
+  ForceEstimate estimate = contact([](const Vec3&) { return 0; });
+  const cv::Point dot(23, 23);
+  const cv::Vec3b good = painted(estimate).at<cv::Vec3b>(dot);
+  estimate.warnings = {"law_out_of_range"};
+  const cv::Vec3b caution = painted(estimate).at<cv::Vec3b>(dot);
+  EXPECT_GT(good[1], good[2]) << "green";
+  EXPECT_GT(std::min(caution[1], caution[2]), 200) << "yellow";
+  EXPECT_LT(caution[0], 100);
+}
+
 }  // namespace
 }  // namespace palpate

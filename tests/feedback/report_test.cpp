@@ -67,6 +67,34 @@ TEST(Report, SaysTheFigures) {
   EXPECT_THAT(html, testing::HasSubstr("not a medical device"));
 }
 
+TEST(Report, TellsWarningsInWordsWithTheirNameAndCount) {
+  Report report = small_report();
+  EXPECT_THAT(report_html(report), testing::Not(testing::HasSubstr("Warnings")));
+  report.rows[3].warnings = "law_out_of_range;sliding";
+  report.rows[4].warnings = "law_out_of_range";
+  const std::string html = report_html(report);
+  EXPECT_THAT(html, testing::HasSubstr("tissue deformed beyond the law's range <span class=\"faint\">(2 of 5 frames, "
+                                       "<code>law_out_of_range</code>)"));
+  EXPECT_THAT(html, testing::HasSubstr("(1 of 5 frames, <code>sliding</code>)"));
+}
+
+TEST(Report, SaysThatNoInstrumentWasSeen) {
+  const std::string sentence = "No instrument was seen in any frame";
+  Report report = small_report();
+  EXPECT_THAT(report_html(report), testing::Not(testing::HasSubstr(sentence)));
+  for (ForceRow& r : report.rows) r.status = "tool_lost";
+  EXPECT_THAT(report_html(report), testing::HasSubstr(sentence));
+  report.rows.clear();
+  EXPECT_THAT(report_html(report), testing::Not(testing::HasSubstr(sentence)));
+}
+
+TEST(Report, GivesTheMedianAndNinetyNinePercentOfTheFrameTime) {
+  Report report = small_report();
+  report.rows.assign(200, row(0, "ok", 1));
+  for (int i = 0; i < 200; ++i) report.rows[static_cast<size_t>(i)].frame_ms = i;
+  EXPECT_THAT(report_html(report), testing::HasSubstr("per frame (median; 99 %: 197.0 ms)"));
+}
+
 TEST(Report, NeedsNothingButItself) {
   const std::string html = report_html(small_report());
   for (const char* outside : {"http", "src=\"/", "<link", "@import", "url("})
