@@ -209,7 +209,7 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
   const auto opened = [&](const std::string& key, const auto& stage) { return in_scene(scene_file, key, stage); };
   Recording recording = opened("recording", [&] { return Recording(scene.recording); });
   const StereoRig rig = opened("recording.calibration", [&] {
-    const StereoRig read = read_rig(scene.recording.calibration, scene.recording.translation_unit);
+    StereoRig read = read_rig(scene.recording.calibration, scene.recording.translation_unit);
     check_rig_fits(read, recording.size());
     return read;
   });

@@ -380,7 +380,7 @@ void Settings::list(const std::string& key, const std::string& doc, const std::f
     resize(1);
     Settings item;
     describe_item(item, 0);
-    const std::string text = document_settings(item, prefix + "[].");
+    std::string text = document_settings(item, prefix + "[].");
     resize(before);
     return text;
   };

@@ -38,20 +38,17 @@ std::vector<CsvTable::Row> split(const std::string& text) {
   row.line = line;
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i], next = i + 1 < text.size() ? text[i + 1] : '\0';
+    const bool ends_row = c == '\n' || (c == '\r' && next != '\n');
     if (quoted && c == '"' && next == '"') {
       field += text[++i];
-    } else if (quoted && c == '"') {
-      quoted = false;
-    } else if (quoted) {
-      field += c;
-    } else if (c == '"' && field.empty()) {
-      quoted = true;
-    } else if (c == ',') {
+    } else if (c == '"' && (quoted || field.empty())) {
+      quoted = !quoted;
+    } else if (!quoted && c == ',') {
       row.fields.push_back(field);
       field.clear();
-    } else if (c == '\n' || (c == '\r' && next != '\n')) {
+    } else if (!quoted && ends_row) {
       end_row();
-    } else if (c != '\r') {
+    } else if (quoted || c != '\r') {
       field += c;
     }
     if (c == '\n') ++line;

@@ -207,7 +207,7 @@ std::string times_table(const std::vector<FrameTimes>& times) {
   };
   std::vector<double> ms(times.size());
   for (const auto& [name, stage] : stages) {
-    std::transform(times.begin(), times.end(), ms.begin(), [&](const FrameTimes& t) { return t.*stage; });
+    std::transform(times.begin(), times.end(), ms.begin(), [part = stage](const FrameTimes& t) { return t.*part; });
     add(name, ms);
   }
   std::transform(times.begin(), times.end(), ms.begin(), [](const FrameTimes& t) { return t.total_ms(); });
