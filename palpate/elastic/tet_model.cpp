@@ -1,41 +1,32 @@
 #include "palpate/elastic/tet_model.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <numeric>
 #include <stdexcept>
+
+#include "palpate/elastic/element_packs.h"
 
 namespace palpate {
 
 namespace {
 
-using Gradients = Eigen::Matrix<double, 4, 3>;  // of the four shape functions, 1/mm
-using Mat12 = Eigen::Matrix<double, 12, 12>;
+/// Below this many elements a slab is not worth a thread of its own.
+constexpr int kElementsPerSlab = 2500, kMostSlabs = 8;
 
-Gradients shape_gradients(const Mat3& inverse_rest_edges) {
-  Gradients g;
-  g.bottomRows<3>() = inverse_rest_edges;
-  g.row(0) = -(g.row(1) + g.row(2) + g.row(3));
-  return g;
-}
-
-Mat9 positive_part(const Mat9& C) {
-  const Eigen::SelfAdjointEigenSolver<Mat9> eigen(C);
-  if (eigen.eigenvalues()[0] >= 0) return C;
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
-}
-
-Mat12 element_stiffness(const Mat9& C, const Gradients& g, double volume) {
-  // B (9 x 12) maps nodal displacements to vec(F): dF_ij = du_ai g_aj.
-  Eigen::Matrix<double, 9, 12> CB;
-  for (int a = 0; a < 4; ++a)
-    CB.block<9, 3>(0, 3 * a) =
-        g(a, 0) * C.block<9, 3>(0, 0) + g(a, 1) * C.block<9, 3>(0, 3) + g(a, 2) * C.block<9, 3>(0, 6);
-  Mat12 K;
-  for (int a = 0; a < 4; ++a)
-    K.block<3, 12>(3 * a, 0) =
-        volume * (g(a, 0) * CB.block<3, 12>(0, 0) + g(a, 1) * CB.block<3, 12>(3, 0) + g(a, 2) * CB.block<3, 12>(6, 0));
-  return K;
+/// Slab of every node along the longest side of the body, about equally many nodes each.
+std::vector<int> slabs_of_nodes(const std::vector<Vec3>& nodes, int slabs) {
+  Vec3 least = nodes.front(), most = least;
+  for (const Vec3& node : nodes) least = least.cwiseMin(node), most = most.cwiseMax(node);
+  Eigen::Index axis = 0;
+  (most - least).maxCoeff(&axis);
+  std::vector<size_t> order(nodes.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return nodes[a][axis] < nodes[b][axis]; });
+  std::vector<int> slab(nodes.size());
+  for (size_t i = 0; i < order.size(); ++i)
+    slab[order[i]] = static_cast<int>(i * static_cast<size_t>(slabs) / order.size());
+  return slab;
 }
 
 }  // namespace
@@ -63,6 +54,7 @@ TetModel::TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::
   }
   if (element == Element::averaged) build_stars();
   build_pattern();
+  build_order();
 }
 
 void TetModel::build_stars() {
@@ -72,6 +64,7 @@ void TetModel::build_stars() {
   for (size_t e = 0; e < tetrahedra_.size(); ++e)
     for (int node : tetrahedra_[e]) stars_[static_cast<size_t>(node)].elements.push_back(static_cast<int>(e));
   for (Star& star : stars_) {
+    star.node = static_cast<int>(&star - stars_.data());
     for (int e : star.elements) {
       star.volume_mm3 += rest_volume_mm3_[static_cast<size_t>(e)] / 4;
       for (int node : tetrahedra_[static_cast<size_t>(e)])
@@ -82,54 +75,82 @@ void TetModel::build_stars() {
   }
 }
 
+int TetModel::position(int row, int column) const {
+  const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
+  const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
+  return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
+}
+
 void TetModel::build_pattern() {
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(tetrahedra_.size() * 78);
-  const auto unknowns_of = [this](const Tetrahedron& t) {
-    std::array<int, 12> unknowns;
-    for (size_t a = 0; a < 4; ++a) {
-      const int first = first_unknown_[static_cast<size_t>(t[a])];
-      for (size_t i = 0; i < 3; ++i) unknowns[3 * a + i] = first < 0 ? -1 : first + static_cast<int>(i);
-    }
-    return unknowns;
+  // Nodes below each node in the lower triangle, then three rows and columns for each.
+  std::vector<std::vector<int>> below(rest_.size());
+  const auto couple = [this, &below](int a, int b) {
+    if (is_fixed(a) || is_fixed(b) || b < a) return;
+    below[static_cast<size_t>(a)].push_back(b);
   };
-  for (const Tetrahedron& t : tetrahedra_) {
-    const auto unknowns = unknowns_of(t);
-    for (int column : unknowns)
-      for (int row : unknowns)
-        if (column >= 0 && row >= column) entries.emplace_back(row, column, 0.0);
+  if (stars_.empty()) {
+    for (const Tetrahedron& t : tetrahedra_)
+      for (int a : t)
+        for (int b : t) couple(a, b);
   }
   for (const Star& star : stars_)
-    for (int column : star.free_nodes)
-      for (int row : star.free_nodes)
-        for (int c = 0; c < 3 && row >= column; ++c)
-          for (int r = row == column ? c : 0; r < 3; ++r)
-            entries.emplace_back(first_unknown(row) + r, first_unknown(column) + c, 0.0);
+    for (int a : star.free_nodes)
+      for (int b : star.free_nodes) couple(a, b);
+  Eigen::VectorXi entries_of_column = Eigen::VectorXi::Zero(unknown_count_);
+  for (size_t a = 0; a < below.size(); ++a) {
+    std::sort(below[a].begin(), below[a].end());
+    below[a].erase(std::unique(below[a].begin(), below[a].end()), below[a].end());
+    for (int c = 0; c < 3 && first_unknown_[a] >= 0; ++c)
+      entries_of_column[first_unknown_[a] + c] = 3 * static_cast<int>(below[a].size());
+  }
   pattern_.resize(unknown_count_, unknown_count_);
-  pattern_.setFromTriplets(entries.begin(), entries.end());
+  pattern_.reserve(entries_of_column);
+  for (size_t a = 0; a < below.size(); ++a)
+    for (int c = 0; c < 3 && first_unknown_[a] >= 0; ++c)
+      for (int b : below[a])
+        for (int r = b == static_cast<int>(a) ? c : 0; r < 3; ++r)
+          pattern_.insert(first_unknown(b) + r, first_unknown_[a] + c) = 0;
   pattern_.makeCompressed();
 
-  const auto position = [this](int row, int column) {
-    const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
-    const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
-    return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
-  };
   for (Star& star : stars_)
     for (auto column = star.free_nodes.begin(); column != star.free_nodes.end(); ++column)
       for (auto row = column; row != star.free_nodes.end(); ++row)
         star.block_start.push_back(position(first_unknown(*row), first_unknown(*column)));
   scatter_.resize(tetrahedra_.size());
   for (size_t e = 0; e < tetrahedra_.size(); ++e) {
-    const auto unknowns = unknowns_of(tetrahedra_[e]);
-    for (size_t c = 0; c < 12; ++c)
-      for (size_t r = 0; r < 12; ++r) {
-        const int row = unknowns[r], column = unknowns[c];
-        int& target = scatter_[e][12 * c + r];
-        target = -1;
-        if (column < 0 || row < column) continue;
-        target = position(row, column);
+    size_t pair = 0;
+    for (size_t a = 0; a < 4; ++a)
+      for (size_t b = 0; b <= a; ++b, ++pair) {
+        const int first_a = first_unknown(tetrahedra_[e][a]), first_b = first_unknown(tetrahedra_[e][b]);
+        const int row = std::max(first_a, first_b), column = std::min(first_a, first_b);
+        scatter_[e].turned[pair] = first_a < first_b;
+        for (int c = 0; c < 3; ++c)
+          scatter_[e].start[pair][static_cast<size_t>(c)] =
+              column < 0 ? -1 : position(a == b ? row + c : row, column + c);
       }
   }
+}
+
+void TetModel::build_order() {
+  const int slabs = std::clamp(element_count() / kElementsPerSlab, 1, kMostSlabs);
+  const std::vector<int> slab_of_node = slabs_of_nodes(rest_, slabs);
+  std::vector<int> least, most;
+  const auto add_item = [&](const auto& nodes) {
+    int low = slabs, high = 0;
+    for (int node : nodes) {
+      low = std::min(low, slab_of_node[static_cast<size_t>(node)]);
+      high = std::max(high, slab_of_node[static_cast<size_t>(node)]);
+    }
+    least.push_back(std::min(low, high));
+    most.push_back(high);
+  };
+  for (const Tetrahedron& t : tetrahedra_) add_item(t);
+  packs_ = std::make_shared<ElementPacks>(
+      pack_elements(order_in_phases(least, most, slabs), tetrahedra_, inverse_rest_edges_, rest_volume_mm3_));
+  least.clear();
+  most.clear();
+  for (const Star& star : stars_) add_item(star.free_nodes);
+  star_phases_ = std::make_shared<Phases>(order_in_phases(least, most, slabs));
 }
 
 Mat3 TetModel::deformation_gradient(const Eigen::VectorXd& u, int element) const {
@@ -138,108 +159,6 @@ Mat3 TetModel::deformation_gradient(const Eigen::VectorXd& u, int element) const
   Mat3 edges_of_u;
   for (int c = 0; c < 3; ++c) edges_of_u.col(c) = u.segment<3>(3 * t[static_cast<size_t>(c) + 1]) - u0;
   return Mat3::Identity() + edges_of_u * inverse_rest_edges_[static_cast<size_t>(element)];
-}
-
-Eigen::VectorXd TetModel::star_pressure_MPa(const Eigen::VectorXd& u) const {
-  Eigen::VectorXd pressure = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stars_.size()));
-  if (stars_.empty()) return pressure;
-  for (size_t e = 0; e < tetrahedra_.size(); ++e) {
-    const Mat3 F = deformation_gradient(u, static_cast<int>(e));
-    const double growth_mm3 = rest_volume_mm3_[e] / 4 * (volume_ratio(tissue_.law, F) - 1);
-    for (int node : tetrahedra_[e]) pressure[node] += growth_mm3;
-  }
-  for (size_t n = 0; n < stars_.size(); ++n)
-    if (stars_[n].volume_mm3 > 0) pressure[static_cast<Eigen::Index>(n)] *= star_bulk_MPa_ / stars_[n].volume_mm3;
-  return pressure;
-}
-
-double TetModel::element_pressure_MPa(const Eigen::VectorXd& star_pressure_MPa, size_t element) const {
-  double sum = 0;
-  for (int node : tetrahedra_[element]) sum += star_pressure_MPa[node];
-  return sum / 4;
-}
-
-double TetModel::energy(const Eigen::VectorXd& u) const {
-  double total = 0;
-  for (int e = 0; e < element_count(); ++e)
-    total += rest_volume_mm3_[static_cast<size_t>(e)] * energy_density(tissue_.law, lame_, deformation_gradient(u, e));
-  const Eigen::VectorXd pressure = star_pressure_MPa(u);
-  for (size_t n = 0; n < stars_.size(); ++n) {
-    const double p = pressure[static_cast<Eigen::Index>(n)];
-    total += stars_[n].volume_mm3 * p * p / (2 * star_bulk_MPa_);
-  }
-  return total;
-}
-
-Eigen::VectorXd TetModel::internal_force(const Eigen::VectorXd& u) const {
-  Eigen::VectorXd force = Eigen::VectorXd::Zero(3 * node_count());
-  const Eigen::VectorXd pressure = star_pressure_MPa(u);
-  for (int e = 0; e < element_count(); ++e) {
-    const size_t i = static_cast<size_t>(e);
-    const Mat3 F = deformation_gradient(u, e);
-    Mat3 P = first_piola_stress(tissue_.law, lame_, F);
-    if (!stars_.empty()) P += element_pressure_MPa(pressure, i) * volume_ratio_gradient(tissue_.law, F);
-    const Gradients g = shape_gradients(inverse_rest_edges_[i]);
-    for (int a = 0; a < 4; ++a)
-      force.segment<3>(3 * tetrahedra_[i][static_cast<size_t>(a)]) += rest_volume_mm3_[i] * P * g.row(a).transpose();
-  }
-  return force;
-}
-
-void TetModel::tangent(const Eigen::VectorXd& u, bool project, Eigen::SparseMatrix<double>& K) const {
-  if (K.nonZeros() != pattern_.nonZeros()) K = pattern_;
-  double* values = K.valuePtr();
-  std::fill(values, values + K.nonZeros(), 0.0);
-  const Eigen::VectorXd pressure = star_pressure_MPa(u);
-  for (int e = 0; e < element_count(); ++e) {
-    const size_t i = static_cast<size_t>(e);
-    const Mat3 F = deformation_gradient(u, e);
-    Mat9 C = stress_derivative(tissue_.law, lame_, F);
-    if (!stars_.empty()) C += element_pressure_MPa(pressure, i) * volume_ratio_curvature(tissue_.law, F);
-    if (project) C = positive_part(C);
-    const Mat12 Ke = element_stiffness(C, shape_gradients(inverse_rest_edges_[i]), rest_volume_mm3_[i]);
-    const std::array<int, 144>& scatter = scatter_[i];
-    const double* entry = Ke.data();
-    for (size_t k = 0; k < 144; ++k)
-      if (scatter[k] >= 0) values[scatter[k]] += entry[k];
-  }
-  add_star_tangents(u, values);
-}
-
-void TetModel::add_star_tangents(const Eigen::VectorXd& u, double* values) const {
-  if (stars_.empty()) return;
-  using VolumeGradient = Eigen::Matrix<double, 3, 4>;  // of a quarter of the element with respect to its nodes, mm^2
-  std::vector<VolumeGradient> of_element(tetrahedra_.size());
-  for (size_t e = 0; e < tetrahedra_.size(); ++e)
-    of_element[e] = rest_volume_mm3_[e] / 4 *
-                    volume_ratio_gradient(tissue_.law, deformation_gradient(u, static_cast<int>(e))) *
-                    shape_gradients(inverse_rest_edges_[e]).transpose();
-  std::vector<Vec3> of_star(rest_.size(), Vec3::Zero());
-  for (const Star& star : stars_) {
-    for (int e : star.elements)
-      for (int a = 0; a < 4; ++a)
-        of_star[static_cast<size_t>(tetrahedra_[static_cast<size_t>(e)][static_cast<size_t>(a)])] +=
-            of_element[static_cast<size_t>(e)].col(a);
-    auto block = star.block_start.begin();
-    for (auto column = star.free_nodes.begin(); column != star.free_nodes.end(); ++column) {
-      const Vec3 scaled = star_bulk_MPa_ / star.volume_mm3 * of_star[static_cast<size_t>(*column)];
-      for (auto row = column; row != star.free_nodes.end(); ++row)
-        add_block(of_star[static_cast<size_t>(*row)], scaled, *row == *column, first_unknown(*column), *block++,
-                  values);
-    }
-    for (int e : star.elements)
-      for (int node : tetrahedra_[static_cast<size_t>(e)]) of_star[static_cast<size_t>(node)].setZero();
-  }
-}
-
-void TetModel::add_block(const Vec3& row, const Vec3& column, bool diagonal, int first_column, int start,
-                         double* values) const {
-  for (int c = 0; c < 3; ++c) {
-    for (int r = diagonal ? c : 0; r < 3; ++r) values[start + r] += row[r] * column[c];
-    // The three columns of a node have the same rows, but each begins one lower, at its diagonal.
-    const int* begin = pattern_.outerIndexPtr() + first_column + c;
-    start += begin[1] - begin[0] - 1;
-  }
 }
 
 double TetModel::smallest_volume_ratio(const Eigen::VectorXd& u) const {

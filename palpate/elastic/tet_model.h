@@ -2,12 +2,17 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
+#include <memory>
 #include <vector>
 
 #include "palpate/core/geometry.h"
 #include "palpate/elastic/material.h"
 
 namespace palpate {
+
+struct ElementPacks;
+struct Phases;
 
 /// How the energy of a change of volume is measured. Linear tetrahedra with a volume ratio each of their own lock in
 /// nearly incompressible tissue and overstate the force. Averaged over the elements around each node (energy-based, so
@@ -58,17 +63,31 @@ class TetModel {
  private:
   /// The elements around one node, a quarter of each: they share one volume ratio.
   struct Star {
+    int node = 0;
     double volume_mm3 = 0;
     std::vector<int> elements;
     std::vector<int> free_nodes;   // ascending
     std::vector<int> block_start;  // for each pair of them, columns first: the first entry of their block in K
   };
+  /// Where the 3 x 3 blocks of an element go: for each pair of its nodes (rows a >= columns b) the first entry of the
+  /// three columns in K, -1 where a node is fixed. In K, the later unknown has the row: `turned` blocks go in
+  /// transposed.
+  struct Scatter {
+    std::array<std::array<int, 3>, 10> start;
+    std::array<bool, 10> turned;
+  };
 
   void build_stars();
   void build_pattern();
+  void build_order();
+  int position(int row, int column) const;
   /// kappa (theta - 1) of every star, MPa; empty for Element::linear.
   Eigen::VectorXd star_pressure_MPa(const Eigen::VectorXd& u) const;
-  double element_pressure_MPa(const Eigen::VectorXd& star_pressure_MPa, size_t element) const;
+  template <class L>
+  void add_element_forces(const Eigen::VectorXd& u, const Eigen::VectorXd& pressure, Eigen::VectorXd& force) const;
+  template <class L>
+  void add_element_tangents(const Eigen::VectorXd& u, const Eigen::VectorXd& pressure, bool project,
+                            double* values) const;
   void add_star_tangents(const Eigen::VectorXd& u, double* values) const;
   void add_block(const Vec3& row, const Vec3& column, bool diagonal, int first_column, int start, double* values) const;
 
@@ -83,7 +102,9 @@ class TetModel {
   std::vector<int> first_unknown_;
   int unknown_count_ = 0;
   Eigen::SparseMatrix<double> pattern_;
-  std::vector<std::array<int, 144>> scatter_;  // element entry -> value of K, -1 above the diagonal or fixed
+  std::vector<Scatter> scatter_;               // one per element
+  std::shared_ptr<const ElementPacks> packs_;  // what the loops over elements run on
+  std::shared_ptr<const Phases> star_phases_;
 };
 
 }  // namespace palpate

@@ -1,0 +1,30 @@
+#include "palpate/elastic/element_packs.h"
+
+namespace palpate {
+
+ElementPacks pack_elements(const Phases& order, const std::vector<Tetrahedron>& tetrahedra,
+                           const std::vector<Mat3>& inverse_rest_edges, const std::vector<double>& rest_volume_mm3) {
+  ElementPacks result;
+  for (const std::vector<Phases::Range>& ranges : order.phases) {
+    result.phases.phases.emplace_back();
+    for (const Phases::Range& range : ranges) {
+      const auto begin = static_cast<int>(result.packs.size());
+      for (int first = range.begin; first < range.end; first += Lanes::kCount) {
+        ElementPack& pack = result.packs.emplace_back();
+        for (int lane = 0; lane < Lanes::kCount; ++lane) {
+          const bool exists = first + lane < range.end;
+          const int e = order.order[static_cast<size_t>(exists ? first + lane : range.end - 1)];
+          const auto l = static_cast<size_t>(lane), number = static_cast<size_t>(e);
+          pack.element[l] = exists ? e : -1;
+          pack.rest_volume_mm3.set(lane, exists ? rest_volume_mm3[number] : 0);
+          for (int k = 0; k < 9; ++k) pack.inverse_rest_edges.data()[k].set(lane, inverse_rest_edges[number].data()[k]);
+          for (size_t a = 0; a < 4; ++a) pack.first_value[a][l] = 3 * tetrahedra[number][a];
+        }
+      }
+      result.phases.phases.back().push_back({begin, static_cast<int>(result.packs.size())});
+    }
+  }
+  return result;
+}
+
+}  // namespace palpate
