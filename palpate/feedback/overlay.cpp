@@ -209,7 +209,7 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
                           estimate.tip_mm, options_.radius_mm);
         for (int c = 0; c < 3; ++c)
           pixel[column][c] =
-              static_cast<uchar>(static_cast<float>(pixel[column][c]) * (1 - alpha) + tint.bgr[c] * alpha + 0.5f);
+              cv::saturate_cast<uchar>(static_cast<float>(pixel[column][c]) * (1 - alpha) + tint.bgr[c] * alpha);
       }
     }
   });

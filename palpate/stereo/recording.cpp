@@ -61,8 +61,8 @@ class ImageFiles : public Source {
 /// Whatever cv::VideoCapture opens: video file, device, GStreamer pipeline, address.
 class Video : public Source {
  public:
-  Video(cv::VideoCapture capture, bool is_file, const std::string& name, const std::string& key)
-      : capture_(std::move(capture)) {
+  Video(const cv::VideoCapture& capture, bool is_file, const std::string& name, const std::string& key)
+      : capture_(capture) {
     size_ = {static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
              static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT))};
     const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
@@ -168,7 +168,7 @@ std::unique_ptr<Source> open_source(const std::filesystem::path& path, const std
                                is_device     ? "camera device"
                                : is_pipeline ? "GStreamer pipeline"
                                              : "video"));
-  return std::make_unique<Video>(std::move(capture), !is_device && !is_pipeline && !is_address, name, key);
+  return std::make_unique<Video>(capture, !is_device && !is_pipeline && !is_address, name, key);
 }
 
 /// Matroska, MPEG streams and the like hold no frame count: OpenCV works it out from the duration.
