@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/SparseCore>
 
 #include "palpate/core/geometry.h"
@@ -8,23 +9,30 @@
 namespace palpate {
 
 /// The patch of tissue that the tip holds: sample points on the rest surface, each tied by barycentric weights to the
-/// nodes of its triangle. Three rows of J per sample; the samples are independent (J K^-1 J^T is regular).
+/// nodes of its triangle, or weighted means of them. Three rows of J per sample or mean; they are independent
+/// (J K^-1 J^T is regular).
 struct Footprint {
   struct Sample {
     Triangle nodes;
     Vec3 barycentric;
   };
   std::vector<Sample> samples;
+  Eigen::MatrixXd means;  ///< one row for each mean that is tied, one column per sample; empty: each sample is tied
   Vec3 center_mm = Vec3::Zero();  ///< rest position of the middle, on the surface
   Vec3 normal = Vec3::UnitZ();    ///< outward normal of the rest surface there
 };
 
-/// Samples within `radius_mm` of the point of the surface nearest to `near_mm`, measured along the surface's tangent
-/// plane. At least one sample. Throws std::invalid_argument when the surface is empty.
+/// Rigid disc of `radius_mm` on the surface, around the point nearest to `near_mm`, measured along the tangent plane
+/// there. Tied are the mean displacement, the mean tilt and the mean stretch of what it covers, weighted as the
+/// pressure of a rigid punch is distributed, 1 / sqrt(1 - (rho / radius)^2) (Sneddon 1965): a half-space answers to the
+/// mean alone as it does to the punch, but no node is held that need not be, so that edges up to the radius suffice.
+/// What the edges h beneath still add, as if the disc were larger by 0.31 h, is taken off its radius beforehand (as
+/// Peaceman 1978 does for a well in coarse cells). Where the mesh cannot tell them apart, fewer means are tied, at
+/// least one. Throws std::invalid_argument when the surface is empty.
 Footprint make_footprint(const TetModel& model, const std::vector<Triangle>& boundary, const Vec3& near_mm,
                          double radius_mm);
 
-/// J of Eq. 3 on the unknowns, 3 m rows.
+/// J of Eq. 3 on the unknowns, three rows per mean or sample.
 Eigen::SparseMatrix<double> constraint_matrix(const TetModel& model, const Footprint& footprint);
 
 }  // namespace palpate
