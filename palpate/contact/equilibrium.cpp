@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <deque>
 
 namespace palpate {
 
@@ -11,8 +11,17 @@ namespace {
 
 constexpr int kMostHalvings = 12;
 constexpr int kMostSubdivisions = 5;
-/// A step with the factor of an earlier state that leaves more than this share of the residual calls for a true one.
-constexpr double kSlowShare = 0.4;
+/// Secants of earlier steps that correct the old factor, and the steps that they may take while they make the residual
+/// fall by kEnoughShare in every kPatience of them.
+constexpr size_t kSecants = 8;
+constexpr int kPatience = 4;
+constexpr double kEnoughShare = 0.3;
+/// Such a step is taken when the slope along it has turned by no more than this share: the energy fell (approximate
+/// Wolfe condition, Hager and Zhang 2005), without its having to be computed.
+constexpr double kTurnedSlope = 0.8;
+constexpr int kMostTries = 5;
+/// Quasi-Newton steps of one call that a fresh factor would need as well.
+constexpr int kFreshSteps = 3;
 /// Conjugate gradients stop at such a share of the residual (in the norm of the preconditioner) or after so many steps.
 constexpr double kLeastGradientShare = 0.03, kMostGradientShare = 0.3;
 constexpr int kMostGradients = 40;
@@ -64,7 +73,10 @@ class BorderedSystem {
 
   bool usable() const { return usable_; }
   bool stale() const { return gradients_ > kStaleGradients; }
+  /// Steps that the age of the factor has cost.
+  void age(int steps) { gradients_ += std::max(0, steps); }
   double rho() const { return rho_; }
+  Eigen::Index constraint_count() const { return J_.rows(); }
 
   /// With the factored state's stiffness.
   NewtonStep solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
@@ -124,6 +136,40 @@ class BorderedSystem {
   bool usable_ = false;
 };
 
+/// Curvature seen between states with the same constraint (L-BFGS; Nocedal 1980): s = du, y = change of the force.
+class Secants {
+ public:
+  void clear() { pairs_.clear(); }
+
+  void add(const Eigen::VectorXd& s, const Eigen::VectorXd& y) {
+    const double sy = s.dot(y);
+    if (sy <= 1e-8 * s.norm() * y.norm()) return;
+    if (pairs_.size() == kSecants) pairs_.pop_front();
+    pairs_.push_back({s, y, 1 / sy});
+  }
+
+  /// Step of descent for the unbalanced force, on top of the factored stiffness.
+  Eigen::VectorXd step(const BorderedSystem& system, const Eigen::VectorXd& unbalanced) const {
+    Eigen::VectorXd q = unbalanced;
+    std::vector<double> alpha(pairs_.size());
+    for (size_t i = pairs_.size(); i-- > 0;) {
+      alpha[i] = pairs_[i].inverse_sy * pairs_[i].s.dot(q);
+      q -= alpha[i] * pairs_[i].y;
+    }
+    Eigen::VectorXd du = system.solve(q, Eigen::VectorXd::Zero(system.constraint_count())).du;
+    for (size_t i = 0; i < pairs_.size(); ++i)
+      du -= (alpha[i] + pairs_[i].inverse_sy * pairs_[i].y.dot(du)) * pairs_[i].s;
+    return du;
+  }
+
+ private:
+  struct Pair {
+    Eigen::VectorXd s, y;
+    double inverse_sy;
+  };
+  std::deque<Pair> pairs_;
+};
+
 double largest_nodal_norm(const Eigen::VectorXd& v) {
   double largest = 0;
   for (Eigen::Index i = 0; i + 2 < v.size(); i += 3) largest = std::max(largest, v.segment<3>(i).norm());
@@ -138,13 +184,15 @@ struct EquilibriumSolver::State {
   Footprint footprint;
   Eigen::SparseMatrix<double> J;
   std::unique_ptr<BorderedSystem> system;
+  Eigen::LDLT<Eigen::MatrixXd> JJt;
+  Secants secants;
   Eigen::VectorXd u;       // unknowns of the last equilibrium
   Eigen::VectorXd lambda;  // its multipliers
   Vec3 displacement_mm = Vec3::Zero();
   int iterations_left = 0;
 
   int solves_left = 0;
-  Eigen::VectorXd last_du, last_dlambda;  // the last step, by last_dp_mm
+  Eigen::VectorXd last_du;  // the last step, by last_dp_mm
   Vec3 last_dp_mm = Vec3::Zero();
   bool balanced = true;  // u is an equilibrium, not just where the solves ran out
 
@@ -155,8 +203,8 @@ struct EquilibriumSolver::State {
 
   /// A point on the way, and how far from balance it is.
   struct Trial {
-    Eigen::VectorXd u, lambda;  // on the unknowns; multipliers
-    Eigen::VectorXd full, f_int, g;
+    Eigen::VectorXd u, lambda;  // on the unknowns; multipliers that balance f_int best
+    Eigen::VectorXd full, f_int, g, unbalanced;
     double residual = 0;
     bool constrained = false;
   };
@@ -166,34 +214,40 @@ struct EquilibriumSolver::State {
   double energy(const Eigen::VectorXd& reduced) const { return model.energy(model.expand(reduced)); }
   bool exhausted() const { return iterations_left <= 0 || solves_left <= 0; }
 
-  void weigh(Trial& trial, const Eigen::VectorXd& target) const {
+  Trial weigh(Eigen::VectorXd reduced, const Eigen::VectorXd& target) const {
+    Trial trial;
+    trial.u = std::move(reduced);
     trial.full = model.expand(trial.u);
     trial.f_int = model.reduce(model.internal_force(trial.full));
     trial.g = target - J * trial.u;
+    trial.lambda = -JJt.solve(J * trial.f_int);
     const Eigen::VectorXd contact = J.transpose() * trial.lambda;
-    trial.residual = largest_nodal_norm(trial.f_int + contact) /
+    trial.unbalanced = trial.f_int + contact;
+    trial.residual = largest_nodal_norm(trial.unbalanced) /
                      std::max(largest_nodal_norm(contact), 1e-9 * system->rho() / kConstraintWeight);
     trial.constrained = trial.g.size() == 0 || trial.g.lpNorm<Eigen::Infinity>() < 1e-9;
+    return trial;
+  }
+
+  /// Only the neo-Hookean energy has a barrier that a step may jump over.
+  bool is_admissible(const Eigen::VectorXd& reduced) const {
+    return model.tissue().law != Law::neo_hookean || std::isfinite(energy(reduced));
   }
 
   /// Where the last step leads when the tip goes on in its direction, else the state as it is.
   Trial begin(const Vec3& p, const Eigen::VectorXd& target) const {
-    Trial trial{u, lambda, {}, {}, {}, 0, false};
     const Vec3 dp_mm = p - displacement_mm;
     const double along = dp_mm.dot(last_dp_mm);
     if (along > kSameDirection * dp_mm.norm() * last_dp_mm.norm()) {
       const double share = along / last_dp_mm.squaredNorm();
       const Eigen::VectorXd ahead = u + share * last_du;
-      if (share < kFarthestAhead && std::isfinite(energy(ahead)))
-        trial = {ahead, lambda + share * last_dlambda, {}, {}, {}, 0, false};
+      if (share < kFarthestAhead && is_admissible(ahead)) return weigh(ahead, target);
     }
-    weigh(trial, target);
-    return trial;
+    return weigh(u, target);
   }
 
   void keep(const Trial& trial, const Vec3& p) {
     last_du = trial.u - u;
-    last_dlambda = trial.lambda - lambda;
     last_dp_mm = p - displacement_mm;
     u = trial.u;
     lambda = trial.lambda;
@@ -209,28 +263,44 @@ struct EquilibriumSolver::State {
       solves_left -= kFactorCost;
       if (!system->factorize(model, trial.full)) return {false, trial.residual};
     }
-    double last_residual = std::numeric_limits<double>::infinity();
-    bool slow = false;  // the old factor alone no longer serves
+    std::deque<double> residuals;
+    bool slow = false;  // the old factor no longer serves, even with secants
+    int quasi_steps = 0;
     for (;;) {
       if (trial.constrained && (trial.residual <= options.relative_residual || exhausted())) {
+        system->age(quasi_steps - kFreshSteps);
         keep(trial, p);
         balanced = trial.residual <= options.relative_residual;
         return {balanced, trial.residual};
       }
       if (exhausted()) return {false, trial.residual};
       --iterations_left;
-      if (trial.constrained) {
-        slow = slow || trial.residual > kSlowShare * last_residual;
-        last_residual = trial.residual;
+      if (trial.constrained && !slow) {
+        residuals.push_back(trial.residual);
+        if (residuals.size() > kPatience) {
+          slow = residuals.back() > kEnoughShare * residuals.front();
+          residuals.pop_front();
+        }
       }
-      if (advance(trial, target, slow)) continue;
+      const bool advanced = !trial.constrained ? constrain(trial, target, slow)
+                            : slow             ? newton_step(trial, target)
+                                               : quasi_newton_step(trial, target);
+      quasi_steps += trial.constrained && !slow;
+      if (advanced) continue;
       if (slow) return {false, trial.residual};
       slow = true;
     }
   }
 
-  /// One step, with the stiffness of the moment or that of the factor; false when it would lead nowhere.
-  bool advance(Trial& trial, const Eigen::VectorXd& target, bool with_tangent) {
+  /// The whole step that brings the footprint to its place; false when it would invert an element.
+  bool constrain(Trial& trial, const Eigen::VectorXd& target, bool with_tangent) {
+    const NewtonStep step = linear_step(trial, with_tangent);
+    if (!step.du.allFinite() || !is_admissible(trial.u + step.du)) return false;
+    trial = weigh(trial.u + step.du, target);
+    return true;
+  }
+
+  NewtonStep linear_step(const Trial& trial, bool with_tangent) {
     int solves = 1;
     // As exact as the distance from balance asks for.
     const double share = std::max(std::clamp(trial.residual, kLeastGradientShare, kMostGradientShare),
@@ -239,18 +309,42 @@ struct EquilibriumSolver::State {
         with_tangent ? system->solve_at(model, trial.full, trial.f_int, trial.g, trial.constrained, share, solves)
                      : system->solve(trial.f_int, trial.g);
     solves_left -= solves;
-    if (!step.du.allFinite() || !step.lambda.allFinite()) return false;
-    const auto at = [&](double length) {
-      Trial next{
-          trial.u + length * step.du, trial.lambda + length * (step.lambda - trial.lambda), {}, {}, {}, 0, false};
-      weigh(next, target);
-      return next;
-    };
-    if (!trial.constrained) {
-      if (!std::isfinite(energy(trial.u + step.du))) return false;
-      trial = at(1);
-      return true;
+    return step;
+  }
+
+  /// One step with the old factor and the secants; false when it leads nowhere.
+  bool quasi_newton_step(Trial& trial, const Eigen::VectorXd& target) {
+    const Eigen::VectorXd du = secants.step(*system, trial.unbalanced);
+    --solves_left;
+    const double slope = trial.unbalanced.dot(du);
+    if (!du.allFinite() || !(slope < 0)) {
+      secants.clear();
+      return false;
     }
+    double length = 1;
+    for (int attempt = 0; attempt < kMostTries; ++attempt) {
+      const Eigen::VectorXd s = length * du;
+      if (!is_admissible(trial.u + s)) {
+        length *= 0.5;
+        continue;
+      }
+      Trial next = weigh(trial.u + s, target);
+      const double next_slope = next.unbalanced.dot(du);
+      if (!std::isfinite(next_slope)) return false;
+      secants.add(s, next.unbalanced - trial.unbalanced);
+      if (next_slope <= -kTurnedSlope * slope) {
+        trial = std::move(next);
+        return true;
+      }
+      length *= std::clamp(slope / (slope - next_slope), 0.1, 0.9);
+    }
+    return false;
+  }
+
+  /// One step with the stiffness of the moment; false when it leads nowhere.
+  bool newton_step(Trial& trial, const Eigen::VectorXd& target) {
+    const NewtonStep step = linear_step(trial, true);
+    if (!step.du.allFinite()) return false;
     // Along the constraint the energy has to fall (Armijo). Near the solution rounding hides that; the residual tells.
     const double before = energy(trial.u), slope = trial.f_int.dot(step.du);
     double length = 1;
@@ -259,7 +353,7 @@ struct EquilibriumSolver::State {
       if (!std::isfinite(after)) continue;
       const bool falls = after <= before + 1e-4 * length * std::min(slope, 0.0);
       if (!falls && after > before + 1e-9 * std::abs(before)) continue;
-      Trial next = at(length);
+      Trial next = weigh(trial.u + length * step.du, target);
       if (!falls && next.residual > 0.5 * trial.residual) continue;
       trial = std::move(next);
       return true;
@@ -306,6 +400,8 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   State& s = *state_;
   s.footprint = footprint;
   s.J = constraint_matrix(s.model, footprint);
+  s.JJt.compute(Eigen::MatrixXd(s.J * s.J.transpose()));
+  s.secants.clear();
   s.system = std::make_unique<BorderedSystem>(s.model, s.J);
   s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
   s.lambda = Eigen::VectorXd::Zero(s.J.rows());
