@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <optional>
+#include <utility>
 
 namespace palpate {
 
@@ -53,6 +55,7 @@ class BorderedSystem {
     JtJ_ = full.triangularView<Eigen::Lower>();
     A_ = K_ + JtJ_;
     factor_.analyze(A_);
+    JJt_.compute(Eigen::MatrixXd(J * J.transpose()));
   }
 
   /// False when even the projected tangent cannot be factored.
@@ -77,13 +80,16 @@ class BorderedSystem {
   void age(int steps) { gradients_ += std::max(0, steps); }
   double rho() const { return rho_; }
   Eigen::Index constraint_count() const { return J_.rows(); }
+  /// The multipliers that balance these forces best.
+  Eigen::VectorXd multipliers(const Eigen::VectorXd& f_int) const { return -JJt_.solve(J_ * f_int); }
 
   /// With the factored state's stiffness.
   NewtonStep solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
-    const Eigen::VectorXd a = factor_.solve(Eigen::VectorXd(-f_int + rho_ * (J_.transpose() * g)));
+    const Eigen::VectorXd a = factor_.solve_roughly(-f_int + rho_ * (J_.transpose() * g));
     NewtonStep step;
     step.lambda = schur_.solve(J_ * a - g);
     step.du = a - Y_ * step.lambda;
+    step.du += J_.transpose() * JJt_.solve(g - J_ * step.du);
     return step;
   }
 
@@ -130,7 +136,7 @@ class BorderedSystem {
   Eigen::SparseMatrix<double> J_, K_, JtJ_, A_;
   SparseFactor factor_;
   Eigen::MatrixXd Y_;  // A^-1 J^T
-  Eigen::LDLT<Eigen::MatrixXd> schur_;
+  Eigen::LDLT<Eigen::MatrixXd> schur_, JJt_;
   double rho_ = 0;
   int gradients_ = 0;  // since the last factorisation
   bool usable_ = false;
@@ -184,7 +190,6 @@ struct EquilibriumSolver::State {
   Footprint footprint;
   Eigen::SparseMatrix<double> J;
   std::unique_ptr<BorderedSystem> system;
-  Eigen::LDLT<Eigen::MatrixXd> JJt;
   Secants secants;
   Eigen::VectorXd u;       // unknowns of the last equilibrium
   Eigen::VectorXd lambda;  // its multipliers
@@ -192,8 +197,11 @@ struct EquilibriumSolver::State {
   int iterations_left = 0;
 
   int solves_left = 0;
-  Eigen::VectorXd last_du;  // the last step, by last_dp_mm
-  Vec3 last_dp_mm = Vec3::Zero();
+  struct Step {
+    Eigen::VectorXd du;
+    Vec3 dp_mm = Vec3::Zero();
+  };
+  Step last_step, earlier_step;
   bool balanced = true;  // u is an equilibrium, not just where the solves ran out
 
   struct Reached {
@@ -220,7 +228,7 @@ struct EquilibriumSolver::State {
     trial.full = model.expand(trial.u);
     trial.f_int = model.reduce(model.internal_force(trial.full));
     trial.g = target - J * trial.u;
-    trial.lambda = -JJt.solve(J * trial.f_int);
+    trial.lambda = system->multipliers(trial.f_int);
     const Eigen::VectorXd contact = J.transpose() * trial.lambda;
     trial.unbalanced = trial.f_int + contact;
     trial.residual = largest_nodal_norm(trial.unbalanced) /
@@ -234,21 +242,30 @@ struct EquilibriumSolver::State {
     return model.tissue().law != Law::neo_hookean || std::isfinite(energy(reduced));
   }
 
-  /// Where the last step leads when the tip goes on in its direction, else the state as it is.
+  /// Where the last steps lead when the tip goes on in their direction, else the state as it is.
   Trial begin(const Vec3& p, const Eigen::VectorXd& target) const {
     const Vec3 dp_mm = p - displacement_mm;
-    const double along = dp_mm.dot(last_dp_mm);
-    if (along > kSameDirection * dp_mm.norm() * last_dp_mm.norm()) {
-      const double share = along / last_dp_mm.squaredNorm();
-      const Eigen::VectorXd ahead = u + share * last_du;
-      if (share < kFarthestAhead && is_admissible(ahead)) return weigh(ahead, target);
-    }
-    return weigh(u, target);
+    const std::optional<double> share = ahead(dp_mm, last_step);
+    if (!share) return weigh(u, target);
+    Eigen::VectorXd du = *share * last_step.du;
+    // With two steps in line, the curve through their ends.
+    if (const auto earlier = ahead(last_step.dp_mm, earlier_step); earlier && *earlier > 1 / kFarthestAhead)
+      du += *share * (1 + *share) / (1 + 1 / *earlier) * (last_step.du - *earlier * earlier_step.du);
+    const Eigen::VectorXd there = u + du;
+    return weigh(is_admissible(there) ? there : u, target);
+  }
+
+  /// How many times the step goes into dp, where it has the same direction.
+  static std::optional<double> ahead(const Vec3& dp_mm, const Step& step) {
+    const double along = dp_mm.dot(step.dp_mm);
+    if (!(along > kSameDirection * dp_mm.norm() * step.dp_mm.norm())) return std::nullopt;
+    const double share = along / step.dp_mm.squaredNorm();
+    if (share >= kFarthestAhead) return std::nullopt;
+    return share;
   }
 
   void keep(const Trial& trial, const Vec3& p) {
-    last_du = trial.u - u;
-    last_dp_mm = p - displacement_mm;
+    earlier_step = std::exchange(last_step, {trial.u - u, p - displacement_mm});
     u = trial.u;
     lambda = trial.lambda;
     displacement_mm = p;
@@ -400,13 +417,12 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   State& s = *state_;
   s.footprint = footprint;
   s.J = constraint_matrix(s.model, footprint);
-  s.JJt.compute(Eigen::MatrixXd(s.J * s.J.transpose()));
   s.secants.clear();
   s.system = std::make_unique<BorderedSystem>(s.model, s.J);
   s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
   s.lambda = Eigen::VectorXd::Zero(s.J.rows());
   s.displacement_mm.setZero();
-  s.last_dp_mm.setZero();
+  s.last_step = s.earlier_step = {};
   s.balanced = true;
 }
 

@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <stdexcept>
+#include <vector>
 
 namespace palpate {
 
@@ -28,11 +29,70 @@ cholmod_sparse lower_view(const Eigen::SparseMatrix<double>& lower) {
   return view;
 }
 
+/// The supernodes of a CHOLMOD factor in single precision.
+struct RoughFactor {
+  std::vector<float> values;  // of L, supernode by supernode, column-major
+
+  void copy(const cholmod_factor& factor) {
+    const auto* x = static_cast<const double*>(factor.x);
+    values.assign(x, x + factor.xsize);
+  }
+
+  /// L L^T x = P b, supernode by supernode.
+  Eigen::VectorXd solve(const cholmod_factor& factor, const Eigen::VectorXd& b) const {
+    const auto* first_column = static_cast<const int*>(factor.super);
+    const auto* first_row = static_cast<const int*>(factor.pi);
+    const auto* first_value = static_cast<const int*>(factor.px);
+    const auto* row_number = static_cast<const int*>(factor.s);
+    const auto* permutation = static_cast<const int*>(factor.Perm);
+    const auto n = static_cast<size_t>(b.size());
+    std::vector<float> x(n), below(factor.maxesize + 1);
+    for (size_t i = 0; i < n; ++i) x[i] = static_cast<float>(b[permutation[i]]);
+    struct Supernode {
+      int columns, rows;  // rows beneath the columns' own
+      const float *own, *beneath;
+      const int* row_number;
+      float* x;
+      int stride;
+    };
+    const auto supernode = [&](size_t k) {
+      const int columns = first_column[k + 1] - first_column[k], stride = first_row[k + 1] - first_row[k];
+      const float* own = values.data() + first_value[k];
+      return Supernode{columns,
+                       stride - columns,
+                       own,
+                       own + columns,
+                       row_number + first_row[k] + columns,
+                       x.data() + first_column[k],
+                       stride};
+    };
+    for (size_t k = 0; k < factor.nsuper; ++k) {
+      const Supernode s = supernode(k);
+      cblas_strsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, s.columns, s.own, s.stride, s.x, 1);
+      if (s.rows == 0) continue;
+      cblas_sgemv(CblasColMajor, CblasNoTrans, s.rows, s.columns, 1, s.beneath, s.stride, s.x, 1, 0, below.data(), 1);
+      for (int r = 0; r < s.rows; ++r) x[static_cast<size_t>(s.row_number[r])] -= below[static_cast<size_t>(r)];
+    }
+    for (size_t k = factor.nsuper; k-- > 0;) {
+      const Supernode s = supernode(k);
+      if (s.rows > 0) {
+        for (int r = 0; r < s.rows; ++r) below[static_cast<size_t>(r)] = x[static_cast<size_t>(s.row_number[r])];
+        cblas_sgemv(CblasColMajor, CblasTrans, s.rows, s.columns, -1, s.beneath, s.stride, below.data(), 1, 1, s.x, 1);
+      }
+      cblas_strsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, s.columns, s.own, s.stride, s.x, 1);
+    }
+    Eigen::VectorXd result(b.size());
+    for (size_t i = 0; i < n; ++i) result[permutation[i]] = x[i];
+    return result;
+  }
+};
+
 }  // namespace
 
 struct SparseFactor::State {
   cholmod_common common{};
   cholmod_factor* factor = nullptr;
+  RoughFactor rough;
 
   State() {
     // OpenBLAS's own threads slow small supernodes down; work is spread over cores above it.
@@ -65,7 +125,13 @@ void SparseFactor::analyze(const Eigen::SparseMatrix<double>& lower) {
 bool SparseFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
   cholmod_sparse view = lower_view(lower);
   cholmod_factorize(&view, state_->factor, &state_->common);
-  return state_->common.status == CHOLMOD_OK && state_->factor->minor == state_->factor->n;
+  if (state_->common.status != CHOLMOD_OK || state_->factor->minor != state_->factor->n) return false;
+  state_->rough.copy(*state_->factor);
+  return true;
+}
+
+Eigen::VectorXd SparseFactor::solve_roughly(const Eigen::VectorXd& b) const {
+  return state_->rough.solve(*state_->factor, b);
 }
 
 Eigen::MatrixXd SparseFactor::solve(const Eigen::MatrixXd& B) const {

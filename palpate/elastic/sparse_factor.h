@@ -20,6 +20,8 @@ class SparseFactor {
   bool factorize(const Eigen::SparseMatrix<double>& lower);
   /// Solves for all columns of B.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& B) const;
+  /// Solves in single precision, which halves the memory that has to be read: for iterations that correct themselves.
+  Eigen::VectorXd solve_roughly(const Eigen::VectorXd& b) const;
 
  private:
   struct State;
