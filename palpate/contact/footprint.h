@@ -23,12 +23,11 @@ struct Footprint {
 };
 
 /// Rigid disc of `radius_mm` on the surface, around the point nearest to `near_mm`, measured along the tangent plane
-/// there. Tied are the mean displacement, the mean tilt and the mean stretch of what it covers, weighted as the
-/// pressure of a rigid punch is distributed, 1 / sqrt(1 - (rho / radius)^2) (Sneddon 1965): a half-space answers to the
-/// mean alone as it does to the punch, but no node is held that need not be, so that edges up to the radius suffice.
-/// What the edges h beneath still add, as if the disc were larger by 0.31 h, is taken off its radius beforehand (as
-/// Peaceman 1978 does for a well in coarse cells). Where the mesh cannot tell them apart, fewer means are tied, at
-/// least one. Throws std::invalid_argument when the surface is empty.
+/// there. What it covers is tied by means of the displacement: against every polynomial on the disc up to a degree as
+/// high as the mesh can tell apart (7, 5, 3, 1 or 0), weighted as the pressure of a rigid punch is distributed,
+/// 1 / sqrt(1 - (rho / radius)^2) (Sneddon 1965). No node is held that need not be; what the edges h beneath still add,
+/// as if the disc were larger by 0.3 to 0.5 h, is taken off its radius beforehand (as Peaceman 1978 does for a well in
+/// coarse cells). Throws std::invalid_argument when the surface is empty.
 Footprint make_footprint(const TetModel& model, const std::vector<Triangle>& boundary, const Vec3& near_mm,
                          double radius_mm);
 

