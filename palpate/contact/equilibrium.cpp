@@ -1,11 +1,12 @@
 #include "palpate/contact/equilibrium.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <optional>
 #include <utility>
+
+#include "palpate/contact/secants.h"
 
 namespace palpate {
 
@@ -13,168 +14,24 @@ namespace {
 
 constexpr int kMostHalvings = 12;
 constexpr int kMostSubdivisions = 5;
-/// Secants of earlier steps that correct the old factor, and the steps that they may take while they make the residual
-/// fall by kEnoughShare in every kPatience of them.
-constexpr size_t kSecants = 8;
+/// Steps with the old factor and its secants go on as long as they make the residual fall to kEnoughShare in every
+/// kPatience of them.
 constexpr int kPatience = 4;
 constexpr double kEnoughShare = 0.3;
 /// Such a step is taken when the slope along it has turned by no more than this share: the energy fell (approximate
 /// Wolfe condition, Hager and Zhang 2005), without its having to be computed.
 constexpr double kTurnedSlope = 0.8;
 constexpr int kMostTries = 5;
-/// Quasi-Newton steps of one call that a fresh factor would need as well.
+/// Steps of one call that a fresh factor would need as well.
 constexpr int kFreshSteps = 3;
-/// Conjugate gradients stop at such a share of the residual (in the norm of the preconditioner) or after so many steps.
+/// Newton steps solve their linear system to such a share of its residual (in the norm of the preconditioner).
 constexpr double kLeastGradientShare = 0.03, kMostGradientShare = 0.3;
-constexpr int kMostGradients = 40;
-/// Steps of conjugate gradients on one factor that have cost more than a new one.
-constexpr int kStaleGradients = 80;
-/// What a new factor and a new tangent cost, in solves.
-constexpr int kFactorCost = 40, kTangentCost = 4;
+/// What a new factor costs, in solves.
+constexpr int kFactorCost = 40;
+/// The contact stiffness is wanted to a per cent of a per cent.
+constexpr double kStiffnessShare = 0.01;
 /// A step is continued when the tip moves on within this cosine of its direction, and not farther than this.
 constexpr double kSameDirection = 0.9, kFarthestAhead = 2;
-/// rho over the mean diagonal of K at rest. With 1, A is indefinite in equilibria of a deep push whose K is positive
-/// definite along the constraint, and Newton falls back to the slow projected tangent there; from 10 on it is not.
-constexpr double kConstraintWeight = 100;
-
-struct NewtonStep {
-  Eigen::VectorXd du;      // on the unknowns
-  Eigen::VectorXd lambda;  // new multipliers
-};
-
-/// Eq. 3 by Schur complement on a factored stiffness A = K + rho J^T J of some earlier state, on one fixed pattern:
-///   A du + J^T lambda = -f_int + rho J^T g,  J du = g.
-/// The same solution as with K, but A is positive definite also where the tissue under the tip softens in compression.
-class BorderedSystem {
- public:
-  BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J) : J_(J) {
-    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * model.node_count());
-    model.tangent(rest, false, K_);
-    rho_ = kConstraintWeight * K_.diagonal().mean();
-    const Eigen::SparseMatrix<double> full = rho_ * (J.transpose() * J);
-    JtJ_ = full.triangularView<Eigen::Lower>();
-    A_ = K_ + JtJ_;
-    factor_.analyze(A_);
-    JJt_.compute(Eigen::MatrixXd(J * J.transpose()));
-  }
-
-  /// False when even the projected tangent cannot be factored.
-  bool factorize(const TetModel& model, const Eigen::VectorXd& u) {
-    usable_ = false;
-    gradients_ = 0;
-    for (bool project : {false, true}) {
-      model.tangent(u, project, K_);
-      A_ = K_ + JtJ_;
-      if (!factor_.factorize(A_)) continue;
-      Y_ = factor_.solve(Eigen::MatrixXd(J_.transpose()));
-      schur_.compute(J_ * Y_);
-      usable_ = schur_.info() == Eigen::Success;
-      return usable_;
-    }
-    return false;
-  }
-
-  bool usable() const { return usable_; }
-  bool stale() const { return gradients_ > kStaleGradients; }
-  /// Steps that the age of the factor has cost.
-  void age(int steps) { gradients_ += std::max(0, steps); }
-  double rho() const { return rho_; }
-  Eigen::Index constraint_count() const { return J_.rows(); }
-  /// The multipliers that balance these forces best.
-  Eigen::VectorXd multipliers(const Eigen::VectorXd& f_int) const { return -JJt_.solve(J_ * f_int); }
-
-  /// With the factored state's stiffness.
-  NewtonStep solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const {
-    const Eigen::VectorXd a = factor_.solve_roughly(-f_int + rho_ * (J_.transpose() * g));
-    NewtonStep step;
-    step.lambda = schur_.solve(J_ * a - g);
-    step.du = a - Y_ * step.lambda;
-    step.du += J_.transpose() * JJt_.solve(g - J_ * step.du);
-    return step;
-  }
-
-  /// With the stiffness at `u`: conjugate gradients within J du = g, preconditioned by `solve` (Gould, Hribar, Nocedal
-  /// 2001), until the residual has fallen to `share`. Where the stiffness is not positive the step ends; with g = 0 it
-  /// is still one of descent.
-  NewtonStep solve_at(const TetModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& f_int,
-                      const Eigen::VectorXd& g, bool constrained, double share, int& solves) {
-    model.tangent(u, false, K_);
-    const Eigen::VectorXd still = Eigen::VectorXd::Zero(J_.rows());
-    Eigen::VectorXd residual = f_int, du = Eigen::VectorXd::Zero(f_int.size());
-    if (!constrained) {
-      du = solve(f_int, g).du;
-      residual += K_.selfadjointView<Eigen::Lower>() * du;
-    }
-    NewtonStep step = solve(residual, still);
-    Eigen::VectorXd along = step.du;
-    step.du = du;
-    double slope = -residual.dot(along);
-    const double enough = share * share * slope;
-    int gradients = constrained ? 1 : 2;
-    for (; gradients < kMostGradients && slope > enough; ++gradients) {
-      const Eigen::VectorXd K_along = K_.selfadjointView<Eigen::Lower>() * along;
-      const double curvature = along.dot(K_along);
-      if (curvature <= 0) {
-        if (gradients == 1) step.du = along;
-        break;
-      }
-      const double length = slope / curvature;
-      step.du += length * along;
-      residual += length * K_along;
-      const NewtonStep correction = solve(residual, still);
-      step.lambda = correction.lambda;
-      const double last_slope = slope;
-      slope = -residual.dot(correction.du);
-      along = correction.du + slope / last_slope * along;
-    }
-    gradients_ += gradients;
-    solves += gradients + kTangentCost;
-    return step;
-  }
-
- private:
-  Eigen::SparseMatrix<double> J_, K_, JtJ_, A_;
-  SparseFactor factor_;
-  Eigen::MatrixXd Y_;  // A^-1 J^T
-  Eigen::LDLT<Eigen::MatrixXd> schur_, JJt_;
-  double rho_ = 0;
-  int gradients_ = 0;  // since the last factorisation
-  bool usable_ = false;
-};
-
-/// Curvature seen between states with the same constraint (L-BFGS; Nocedal 1980): s = du, y = change of the force.
-class Secants {
- public:
-  void clear() { pairs_.clear(); }
-
-  void add(const Eigen::VectorXd& s, const Eigen::VectorXd& y) {
-    const double sy = s.dot(y);
-    if (sy <= 1e-8 * s.norm() * y.norm()) return;
-    if (pairs_.size() == kSecants) pairs_.pop_front();
-    pairs_.push_back({s, y, 1 / sy});
-  }
-
-  /// Step of descent for the unbalanced force, on top of the factored stiffness.
-  Eigen::VectorXd step(const BorderedSystem& system, const Eigen::VectorXd& unbalanced) const {
-    Eigen::VectorXd q = unbalanced;
-    std::vector<double> alpha(pairs_.size());
-    for (size_t i = pairs_.size(); i-- > 0;) {
-      alpha[i] = pairs_[i].inverse_sy * pairs_[i].s.dot(q);
-      q -= alpha[i] * pairs_[i].y;
-    }
-    Eigen::VectorXd du = system.solve(q, Eigen::VectorXd::Zero(system.constraint_count())).du;
-    for (size_t i = 0; i < pairs_.size(); ++i)
-      du -= (alpha[i] + pairs_[i].inverse_sy * pairs_[i].y.dot(du)) * pairs_[i].s;
-    return du;
-  }
-
- private:
-  struct Pair {
-    Eigen::VectorXd s, y;
-    double inverse_sy;
-  };
-  std::deque<Pair> pairs_;
-};
 
 double largest_nodal_norm(const Eigen::VectorXd& v) {
   double largest = 0;
@@ -231,8 +88,8 @@ struct EquilibriumSolver::State {
     trial.lambda = system->multipliers(trial.f_int);
     const Eigen::VectorXd contact = J.transpose() * trial.lambda;
     trial.unbalanced = trial.f_int + contact;
-    trial.residual = largest_nodal_norm(trial.unbalanced) /
-                     std::max(largest_nodal_norm(contact), 1e-9 * system->rho() / kConstraintWeight);
+    trial.residual =
+        largest_nodal_norm(trial.unbalanced) / std::max(largest_nodal_norm(contact), system->negligible_force_N());
     trial.constrained = trial.g.size() == 0 || trial.g.lpNorm<Eigen::Infinity>() < 1e-9;
     return trial;
   }
@@ -322,9 +179,9 @@ struct EquilibriumSolver::State {
     // As exact as the distance from balance asks for.
     const double share = std::max(std::clamp(trial.residual, kLeastGradientShare, kMostGradientShare),
                                   0.1 * options.relative_residual / trial.residual);
-    const NewtonStep step =
-        with_tangent ? system->solve_at(model, trial.full, trial.f_int, trial.g, trial.constrained, share, solves)
-                     : system->solve(trial.f_int, trial.g);
+    const Eigen::VectorXd g = trial.constrained ? Eigen::VectorXd::Zero(trial.g.size()) : trial.g;
+    const NewtonStep step = with_tangent ? system->solve_at(model, trial.full, trial.f_int, g, share, solves)
+                                         : system->solve(trial.f_int, g);
     solves_left -= solves;
     return step;
   }
@@ -385,6 +242,11 @@ struct EquilibriumSolver::State {
     return half.converged ? move_to(p, depth + 1) : half;
   }
 
+  Vec3 contact_force_N() const {
+    const Eigen::VectorXd on_tissue = -(J.transpose() * lambda);
+    return Eigen::Map<const Eigen::Matrix3Xd>(on_tissue.data(), 3, on_tissue.size() / 3).rowwise().sum();
+  }
+
   Equilibrium answer(const Reached& reached) const {
     Equilibrium result;
     result.converged = reached.converged;
@@ -393,15 +255,14 @@ struct EquilibriumSolver::State {
     result.u = model.expand(u);
     result.lambda = lambda;
     result.smallest_volume_ratio = model.smallest_volume_ratio(result.u);
-    const Eigen::VectorXd on_tissue = -(J.transpose() * lambda);
+    result.force_N = contact_force_N();
+    const Eigen::VectorXd on_tissue = J.transpose() * lambda;
     double sum_of_norms = 0;
     int loaded_nodes = 0;
     for (Eigen::Index i = 0; i + 2 < on_tissue.size(); i += 3) {
-      const Vec3 force = on_tissue.segment<3>(i);
-      result.force_N += force;
-      if (force.squaredNorm() == 0) continue;
-      sum_of_norms += force.norm();
-      ++loaded_nodes;
+      const double magnitude_N = on_tissue.segment<3>(i).norm();
+      sum_of_norms += magnitude_N;
+      loaded_nodes += magnitude_N > 0;
     }
     if (loaded_nodes > 0) result.mean_nodal_force_N = sum_of_norms / loaded_nodes;
     return result;
@@ -424,6 +285,26 @@ void EquilibriumSolver::hold(const Footprint& footprint) {
   s.displacement_mm.setZero();
   s.last_step = s.earlier_step = {};
   s.balanced = true;
+}
+
+ContactStiffness EquilibriumSolver::contact_stiffness() {
+  State& s = *state_;
+  ContactStiffness answer;
+  if (!s.system) return answer;
+  answer.displacement_mm = s.displacement_mm;
+  answer.force_N = s.contact_force_N();
+  if (!s.system->usable() && !s.system->factorize(s.model, s.model.expand(s.u))) return answer;
+  // B = du/dp minimises B^T K B within J B = I, so that a small error of B counts squared.
+  const Eigen::VectorXd no_force = Eigen::VectorXd::Zero(s.u.size());
+  Eigen::MatrixXd B(s.u.size(), 3), KB(s.u.size(), 3);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::VectorXd along = Vec3::Unit(i).replicate(s.J.rows() / 3, 1);
+    int solves = 0;
+    B.col(i) = s.system->solve_at(s.model, s.model.expand(s.u), no_force, along, kStiffnessShare, solves).du;
+    KB.col(i) = s.system->times_stiffness(B.col(i));
+  }
+  answer.stiffness_N_per_mm = B.transpose() * KB;
+  return answer;
 }
 
 void EquilibriumSolver::release() {

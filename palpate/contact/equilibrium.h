@@ -27,6 +27,15 @@ struct Equilibrium {
   double mean_nodal_force_N = 0;  ///< F_f of the paper: mean magnitude of the nodal forces around the contact
 };
 
+/// The force for a tip near a solved state, at any rate: F(p) = force + stiffness (p - displacement).
+struct ContactStiffness {
+  Vec3 displacement_mm = Vec3::Zero();
+  Vec3 force_N = Vec3::Zero();             ///< of the instrument on the tissue
+  Mat3 stiffness_N_per_mm = Mat3::Zero();  ///< dF/dp, symmetric
+
+  Vec3 force_at(const Vec3& p_mm) const { return force_N + stiffness_N_per_mm * (p_mm - displacement_mm); }
+};
+
 /// Keeps the factor and the last state of one body with one footprint; solves for the displacement p of the footprint.
 class EquilibriumSolver {
  public:
@@ -43,6 +52,10 @@ class EquilibriumSolver {
   /// an earlier state serves as long as it makes the residual fall quickly, then as the preconditioner of conjugate
   /// gradients. An answer that ran out of `most_solves` is where the next call goes on.
   Equilibrium solve(const Vec3& displacement_mm);
+
+  /// The stiffness of the contact at the state of the last answer: (J K^-1 J^T)^-1 condensed on one displacement of all
+  /// samples, by three solves.
+  ContactStiffness contact_stiffness();
 
  private:
   struct State;

@@ -130,6 +130,10 @@ bool SparseFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
   return true;
 }
 
+double SparseFactor::operations() const {
+  return state_->common.fl;
+}
+
 Eigen::VectorXd SparseFactor::solve_roughly(const Eigen::VectorXd& b) const {
   return state_->rough.solve(*state_->factor, b);
 }

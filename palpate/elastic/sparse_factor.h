@@ -18,6 +18,8 @@ class SparseFactor {
   void analyze(const Eigen::SparseMatrix<double>& lower);
   /// Numeric factorisation; false when the matrix is not positive definite.
   bool factorize(const Eigen::SparseMatrix<double>& lower);
+  /// Floating point operations of one factorisation.
+  double operations() const;
   /// Solves for all columns of B.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& B) const;
   /// Solves in single precision, which halves the memory that has to be read: for iterations that correct themselves.
