@@ -15,8 +15,9 @@ constexpr int kTangentCost = 4;
 /// rho over the mean diagonal of K at rest. With 1, A is indefinite in equilibria of a deep push whose K is positive
 /// definite along the constraint, and Newton falls back to the slow projected tangent there; from 10 on it is not.
 constexpr double kConstraintWeight = 100;
-/// Of the mean diagonal of K, times 1 mm.
-constexpr double kNegligible_mm = 1e-9;
+/// The force of a contact at rest is zero: its residual is weighed against the force that moves a node this far, times
+/// the mean diagonal of K.
+constexpr double kNegligible_mm = 1e-4;
 
 }  // namespace
 

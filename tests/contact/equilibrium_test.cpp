@@ -116,6 +116,23 @@ TEST(Equilibrium, DoesNotDependOnTheWayThere) {
   EXPECT_LT((a.force_N - b.force_N).norm(), 1e-5 * a.force_N.norm());
 }
 
+TEST(Equilibrium, ATipThatComesBackFindsTheTissueAtRest) {
+  const Block block;
+  for (Law law : {Law::saint_venant_kirchhoff, Law::neo_hookean, Law::corotated, Law::linear}) {
+    const TetModel model = block.model_of(law, 400);
+    EquilibriumOptions exact;
+    exact.relative_residual = 1e-8;
+    EquilibriumSolver solver(model, exact);
+    solver.hold(make_footprint(model, block.boundary, {20, 20, 0}, 4));
+    for (const Vec3& p : {Vec3(0, 0, -4), Vec3(1, 2, -2), Vec3(0.3, 0.5, -0.5)})
+      ASSERT_TRUE(solver.solve(p).converged) << law_name(law);
+    const Equilibrium found = solver.solve(Vec3::Zero());
+    EXPECT_TRUE(found.converged) << law_name(law);
+    EXPECT_LT(found.u.lpNorm<Eigen::Infinity>(), 1e-8) << law_name(law);
+    EXPECT_LT(found.force_N.norm(), 1e-8) << law_name(law);
+  }
+}
+
 TEST(Equilibrium, StaysConvergedThroughADeepPushWithADrag) {
   const Block block;
   for (Element element : {Element::linear, Element::averaged}) {
