@@ -1,5 +1,7 @@
 #include "palpate/stereo/eyes.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -47,18 +49,23 @@ cv::Mat matchable_mask(const cv::Mat& bgr) {
 }
 
 Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask) {
+  struct Eye {
+    cv::Mat grey, matchable;
+    cv::Scalar mean, deviation;
+  } left, right;
+  const auto look = [](const cv::Mat& bgr, Eye& eye) {
+    eye.matchable = matchable_mask(bgr);
+    cv::cvtColor(bgr, eye.grey, cv::COLOR_BGR2GRAY);
+    cv::meanStdDev(eye.grey, eye.mean, eye.deviation, eye.matchable);
+  };
+  tbb::parallel_invoke([&] { look(left_bgr, left); }, [&] { look(right_bgr, right); });
   Eyes eyes;
-  eyes.left_mask = matchable_mask(left_bgr) & mask;
-  eyes.right_mask = matchable_mask(right_bgr);
-  cv::Mat left, right;
-  cv::cvtColor(left_bgr, left, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(right_bgr, right, cv::COLOR_BGR2GRAY);
-  cv::Scalar left_mean, left_deviation, right_mean, right_deviation;
-  cv::meanStdDev(left, left_mean, left_deviation, matchable_mask(left_bgr));
-  cv::meanStdDev(right, right_mean, right_deviation, eyes.right_mask);
-  const double gain = right_deviation[0] > 1 ? left_deviation[0] / right_deviation[0] : 1;
-  left.convertTo(eyes.left, CV_32F);
-  right.convertTo(eyes.right, CV_32F, gain, left_mean[0] - gain * right_mean[0]);
+  eyes.left_mask = left.matchable & mask;
+  eyes.wanted = mask & ~black_border(left_bgr);
+  eyes.right_mask = right.matchable;
+  const double gain = right.deviation[0] > 1 ? left.deviation[0] / right.deviation[0] : 1;
+  left.grey.convertTo(eyes.left, CV_32F);
+  right.grey.convertTo(eyes.right, CV_32F, gain, left.mean[0] - gain * right.mean[0]);
   return eyes;
 }
 

@@ -9,8 +9,9 @@ namespace palpate {
 struct Eyes {
   cv::Mat left;        ///< CV_32F, grey levels
   cv::Mat right;       ///< CV_32F, grey levels
-  cv::Mat left_mask;   ///< 8-bit, 255 = can be matched
-  cv::Mat right_mask;  ///< 8-bit, 255 = can be matched
+  cv::Mat left_mask;   ///< 8-bit, 255 = shows what the right eye can see too
+  cv::Mat right_mask;  ///< 8-bit, 255 = shows what the left eye can see too
+  cv::Mat wanted;      ///< 8-bit, 255 = where in the left image a disparity is wanted: small highlights too
 };
 
 /// `mask` (8-bit) is where the left image is wanted.

@@ -1,5 +1,6 @@
 #include "palpate/stereo/grow.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -9,7 +10,7 @@
 namespace palpate {
 namespace {
 
-using GrowWindow = Window<8>;
+constexpr int kTogether = 256;  // the best matches that hand on their planes at a time
 constexpr float kLeastCorrelation = 0.6f;
 constexpr float kLeastSeedCorrelation = 0.8f;
 constexpr float kMostStep = 0.75f;   // half-size px from the prediction of a neighbour
@@ -24,28 +25,39 @@ Level halve(const cv::Mat& grey, const cv::Mat& mask) {
   return make_level(half, half_mask);
 }
 
+// A plane that a neighbour hands on, and what the fit from there found.
+struct Proposal {
+  int index;
+  DisparityPlane plane;
+  WindowFit found = {};
+  bool accepted = false;
+};
+
 class Grower {
  public:
   Grower(const Eyes& eyes, double least, double most)
       : left_(halve(eyes.left, eyes.left_mask)),
         right_(halve(eyes.right, eyes.right_mask)),
         least_(static_cast<float>(least / 2)),
-        most_(static_cast<float>(most / 2)) {
+        most_(static_cast<float>(most / 2)),
+        wanted_(eyes.wanted) {
     grid_.columns = (eyes.left.cols + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
     grid_.rows = (eyes.left.rows + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
     grid_.cells.resize(static_cast<size_t>(grid_.columns * grid_.rows));
+    proposed_.resize(grid_.cells.size());
   }
 
   CellGrid run(const Seeds& seeds) {
-    for (const Seed& seed : seeds.matches) {
-      const int column = cvRound(seed.left_px.x / CellGrid::kStep_px),
-                row = cvRound(seed.left_px.y / CellGrid::kStep_px);
-      try_cell(column, row, {seed.disparity_px / 2, 0, 0}, kLeastSeedCorrelation);
-    }
+    for (const Seed& seed : seeds.matches)
+      propose(cvRound(seed.left_px.x / CellGrid::kStep_px), cvRound(seed.left_px.y / CellGrid::kStep_px),
+              {seed.disparity_px / 2, 0, 0});
+    try_proposals(kLeastSeedCorrelation);
     while (!queue_.empty()) {
-      const int index = queue_.top().second;
-      queue_.pop();
-      spread(index % grid_.columns, index / grid_.columns);
+      for (int i = 0; i < kTogether && !queue_.empty(); ++i) {
+        spread(queue_.top().second);
+        queue_.pop();
+      }
+      try_proposals(kLeastCorrelation);
     }
     check_from_the_right();
     drop_islands();
@@ -57,28 +69,51 @@ class Grower {
   static constexpr int kHalfStep = CellGrid::kStep_px / 2;
 
   static bool fit(const Level& from, const Level& to, cv::Point at, const DisparityPlane& predicted, WindowFit& found) {
-    GrowWindow window;
+    Window window;
     return window.cut(from, at) && window.fit(to, predicted, kMostStep, kSteepest, 4, found);
   }
 
-  void spread(int column, int row) {
+  void propose(int column, int row, const DisparityPlane& plane) {
+    if (!grid_.holds(column, row)) return;
+    const int index = row * grid_.columns + column;
+    const cv::Point at(column * kHalfStep, row * kHalfStep);
+    if (grid_.at(column, row).matched || proposed_[static_cast<size_t>(index)] || !left_.holds(at) ||
+        !wanted_.at<uchar>(row * CellGrid::kStep_px, column * CellGrid::kStep_px))
+      return;
+    proposed_[static_cast<size_t>(index)] = true;
+    proposals_.push_back({index, plane});
+  }
+
+  void spread(int index) {
+    const int column = index % grid_.columns, row = index / grid_.columns;
     const DisparityPlane from = grid_.at(column, row).plane;
     for (const auto& [i, j] : {std::pair{-1, 0}, std::pair{1, 0}, std::pair{0, -1}, std::pair{0, 1}}) {
       const float shift = kHalfStep * (static_cast<float>(i) * from.dx + static_cast<float>(j) * from.dy);
-      try_cell(column + i, row + j, {from.d + shift, from.dx, from.dy}, kLeastCorrelation);
+      propose(column + i, row + j, {from.d + shift, from.dx, from.dy});
     }
   }
 
-  void try_cell(int column, int row, DisparityPlane plane, float least_correlation) {
-    if (!grid_.holds(column, row)) return;
-    Cell& cell = grid_.at(column, row);
-    const cv::Point at(column * kHalfStep, row * kHalfStep);
-    if (cell.matched || !left_.holds(at) || *left_.weight_at(at.x, at.y) == 0) return;
-    WindowFit found;
-    if (!fit(left_, right_, at, plane, found) || found.correlation < least_correlation) return;
-    if (found.plane.d < least_ || found.plane.d > most_) return;
-    cell = {found.plane, found.correlation, found.information, true};
-    queue_.emplace(found.correlation, row * grid_.columns + column);
+  // Fits side by side, taken over in the order of the proposals, so that the answer does not depend on threads.
+  void try_proposals(float least_correlation) {
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, proposals_.size(), 16), [&](const tbb::blocked_range<size_t>& some) {
+          for (size_t i = some.begin(); i != some.end(); ++i) {
+            Proposal& proposal = proposals_[i];
+            const cv::Point at(proposal.index % grid_.columns * kHalfStep, proposal.index / grid_.columns * kHalfStep);
+            WindowFit& found = proposal.found;
+            proposal.accepted = fit(left_, right_, at, proposal.plane, found) &&
+                                found.correlation >= least_correlation && found.plane.d >= least_ &&
+                                found.plane.d <= most_;
+          }
+        });
+    for (const Proposal& proposal : proposals_) {
+      proposed_[static_cast<size_t>(proposal.index)] = false;
+      if (!proposal.accepted) continue;
+      grid_.cells[static_cast<size_t>(proposal.index)] = {proposal.found.plane, proposal.found.correlation,
+                                                          proposal.found.information, true};
+      queue_.emplace(proposal.found.correlation, proposal.index);
+    }
+    proposals_.clear();
   }
 
   void check_from_the_right() {
@@ -134,7 +169,10 @@ class Grower {
   Level right_;
   float least_;
   float most_;
+  cv::Mat wanted_;
   CellGrid grid_;
+  std::vector<Proposal> proposals_;
+  std::vector<char> proposed_;  // cells among them
   std::priority_queue<std::pair<float, int>> queue_;
 };
 

@@ -96,6 +96,7 @@ DisparityMap match(const RectifiedPair& pair, const Rectification& rectification
   const double most = rectification.disparity_px(options.nearest_mm);
   Eyes eyes = prepare_eyes(pair.left, pair.right, mask);
   eyes.left_mask &= rectification.valid_left;
+  eyes.wanted &= rectification.valid_left;
   eyes.right_mask &= rectification.valid_right;
   const Seeds seeds = find_seeds(eyes, least, most);
   check_seeds(eyes, seeds, least, most);

@@ -1,10 +1,24 @@
 #include "palpate/stereo/quasi_dense.h"
 
+#include <tbb/parallel_invoke.h>
+
+#include <opencv2/imgproc.hpp>
+
 #include "palpate/stereo/grow.h"
 #include "palpate/stereo/refine.h"
 #include "palpate/stereo/seeds.h"
 
 namespace palpate {
+namespace {
+
+// A touch of blur takes the finest detail away, which interpolation between pixels gets wrong.
+Level softened(const cv::Mat& grey, const cv::Mat& mask) {
+  cv::Mat soft;
+  cv::GaussianBlur(grey, soft, {3, 3}, 0.6);
+  return make_level(soft, mask);
+}
+
+}  // namespace
 
 DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask,
                                double least_disparity_px, double most_disparity_px) {
@@ -17,8 +31,13 @@ DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr
 DisparityMap match_quasi_dense(const Eyes& eyes, const Seeds& seeds, double least_disparity_px,
                                double most_disparity_px) {
   CellGrid grid = grow(eyes, seeds, least_disparity_px, most_disparity_px);
-  refine_cells(eyes, grid);
-  smooth_cells(grid);
+  Level left, right;
+  tbb::parallel_invoke([&] { left = softened(eyes.left, eyes.left_mask); },
+                       [&] { right = softened(eyes.right, eyes.right_mask); });
+  for (const Reach reach : {Reach{5, 1}, Reach{10, 2}}) {
+    refine_cells(left, right, grid);
+    smooth_cells(grid, reach);
+  }
   DisparityMap map = fill_between_cells(eyes, grid);
   map.row_offset_px = seeds.row_offset_px;
   return map;

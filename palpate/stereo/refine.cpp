@@ -2,10 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 namespace palpate {
 namespace {
@@ -13,112 +11,111 @@ namespace {
 constexpr float kMostStep_px = 1.0f;
 constexpr float kSteepest = 0.9f;
 constexpr float kLeastCorrelation = 0.6f;
-constexpr float kSameSurface_px = 0.7f;
-constexpr float kLeastAgreement = 0.3f;   // of the neighbours, by weight
-constexpr float kLeastNeighbours = 4.0f;  // by weight
+constexpr float kLeastShare = 0.2f;      // of the window's weight
+constexpr float kLeastGradient = 0.02f;  // mean square of the gradient, grey levels per px
+constexpr int kRadius = 7;
+constexpr int kRows = 2 * kRadius + 1;
+constexpr FloatLanes kColumn = {-7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 7, 8};
 
-using RefineWindow = Window<16>;
-
-}  // namespace
-
-void refine_cells(const Eyes& eyes, CellGrid& grid) {
-  // A touch of blur takes the finest detail away, which interpolation between pixels gets wrong.
-  cv::Mat left_grey, right_grey;
-  cv::GaussianBlur(eyes.left, left_grey, {3, 3}, 0.6);
-  cv::GaussianBlur(eyes.right, right_grey, {3, 3}, 0.6);
-  const Level left = make_level(left_grey, eyes.left_mask);
-  const Level right = make_level(right_grey, eyes.right_mask);
-  tbb::parallel_for(0, grid.rows, [&](int row) {
-    RefineWindow window;
-    for (int column = 0; column < grid.columns; ++column) {
-      Cell& cell = grid.at(column, row);
-      if (!cell.matched) continue;
-      WindowFit found;
-      cell.matched = window.cut(left, {column * CellGrid::kStep_px, row * CellGrid::kStep_px}) &&
-                     window.fit(right, cell.plane, kMostStep_px, kSteepest, 2, found) &&
-                     found.correlation > kLeastCorrelation;
-      if (cell.matched) cell = {found.plane, found.correlation, found.information, true};
-    }
-  });
+constexpr float falloff(float t) {
+  return 1 - t * t / ((kRadius + 1) * (kRadius + 1));
 }
 
-namespace {
-
-constexpr int kSmoothRadius = 5;  // cells
-using Vector6 = Eigen::Matrix<float, 6, 1>;
-
-// One cell of the neighbourhood that a quadratic is fitted to, with its share in the normal equations; arrays of eight
-// so that sums over them are vector instructions.
-struct Neighbour {
-  int column, row;
-  float u, v;  // px
-  float falloff;
-  float basis[8];      // 1, u, v, u^2 / 2, u v, v^2 / 2
-  float products[24];  // lower triangle of basis basis^T
+// The left image, the right one drawn where the left one sees it, their mean slope along the row, and where both are
+// known. With margins as in Level.
+struct Superposed {
+  cv::Mat left, right, slope, weight;
 };
 
-std::vector<Neighbour> neighbourhood() {
-  std::vector<Neighbour> all;
-  for (int j = -kSmoothRadius; j <= kSmoothRadius; ++j)
-    for (int i = -kSmoothRadius; i <= kSmoothRadius; ++i) {
-      const float distance =
-          static_cast<float>(i * i + j * j) / static_cast<float>((kSmoothRadius + 1) * (kSmoothRadius + 1));
-      if (distance >= 1) continue;
-      const float u = static_cast<float>(i * CellGrid::kStep_px), v = static_cast<float>(j * CellGrid::kStep_px);
-      Neighbour n{i, j, u, v, (1 - distance) * (1 - distance), {1, u, v, 0.5f * u * u, u * v, 0.5f * v * v}, {}};
-      for (int k = 0, at = 0; k < 6; ++k)
-        for (int m = 0; m <= k; ++m) n.products[at++] = n.basis[k] * n.basis[m];
-      all.push_back(n);
+Superposed superpose(const Level& left, const Level& right, const cv::Mat& disparity) {
+  constexpr int m = Level::kMargin_px;
+  Superposed result;
+  result.left = left.grey;
+  for (cv::Mat* plane : {&result.right, &result.slope, &result.weight})
+    *plane = cv::Mat(left.grey.size(), CV_32F, cv::Scalar(0));
+  const float most = static_cast<float>(left.size.width - 1);
+  tbb::parallel_for(0, left.size.height, [&](int y) {
+    const float* d = disparity.ptr<float>(y);
+    const float *grey = right.grey_at(0, y), *mask = right.weight_at(0, y);
+    const float *left_slope = left.gradient_at(0, y), *left_mask = left.weight_at(0, y);
+    float* value = result.right.ptr<float>(y + m) + m;
+    float* slope = result.slope.ptr<float>(y + m) + m;
+    float* weight = result.weight.ptr<float>(y + m) + m;
+    for (int x = 0; x < left.size.width; ++x) {
+      const float at = static_cast<float>(x) - d[x];
+      const bool inside = at >= 0 && at <= most;  // false for NaN
+      const float there = inside ? at : 0;
+      const int whole = static_cast<int>(there);
+      const float t = there - static_cast<float>(whole);
+      // Catmull-Rom and its derivative.
+      const float a = grey[whole - 1], b = grey[whole], c = grey[whole + 1], e = grey[whole + 2];
+      const float c1 = 0.5f * (c - a), c2 = a - 2.5f * b + 2 * c - 0.5f * e, c3 = 0.5f * (e - a) + 1.5f * (b - c);
+      value[x] = b + t * (c1 + t * (c2 + t * c3));
+      slope[x] = 0.5f * (left_slope[x] + c1 + t * (2 * c2 + 3 * t * c3));
+      weight[x] = inside ? left_mask[x] * mask[static_cast<int>(there + 0.5f)] : 0;
     }
-  return all;
+  });
+  return result;
 }
 
-// Quadratic through the neighbours on the same surface, as a change of the cell's own plane; nothing where too few
-// of the neighbours stand on it.
-std::optional<Vector6> fit_quadratic(const CellGrid& grid, const std::vector<Cell>& cells,
-                                     const std::vector<Neighbour>& around, int column, int row) {
-  const DisparityPlane plane = cells[static_cast<size_t>(row * grid.columns + column)].plane;
-  float products[24] = {}, sums[8] = {};
-  float agreeing = 0, all = 0;
-  for (const Neighbour& n : around) {
-    if (!grid.holds(column + n.column, row + n.row)) continue;
-    const Cell& other = cells[static_cast<size_t>((row + n.row) * grid.columns + column + n.column)];
-    const float off = other.plane.d - plane.at(n.u, n.v);
-    if (!other.matched) continue;
-    all += n.falloff;
-    if (std::abs(off) > kSameSurface_px + 1 / std::sqrt(other.information)) continue;
-    agreeing += n.falloff;
-    const float weight = other.information * n.falloff, weighted_off = weight * off;
-    for (int k = 0; k < 24; ++k) products[k] += weight * n.products[k];
-    for (int k = 0; k < 8; ++k) sums[k] += weighted_off * n.basis[k];
+// Sums over the window around a pixel, 15 x 15.
+WindowSums sums_around(const Superposed& images, int x, int y) {
+  constexpr int m = Level::kMargin_px;
+  const float middle = images.left.at<float>(y + m, x + m);
+  const FloatLanes column_falloff = 1 - kColumn * kColumn / static_cast<float>((kRadius + 1) * (kRadius + 1));
+  FloatLanes n = {}, l = {}, r = {}, ll = {}, rr = {}, lr = {}, g = {}, gv = {}, gg = {}, ggv = {}, ggvv = {};
+  FloatLanes gl = {}, glv = {}, gr = {}, grv = {};
+  for (int j = 0; j < kRows; ++j) {
+    const int row = y + j - kRadius + m, first = x - kRadius + m;
+    const float v = static_cast<float>(j - kRadius);
+    const FloatLanes left = load_lanes(images.left.ptr<float>(row) + first) - middle;
+    const FloatLanes right = load_lanes(images.right.ptr<float>(row) + first) - middle;
+    const FloatLanes slope = load_lanes(images.slope.ptr<float>(row) + first);
+    const FloatLanes w = load_lanes(images.weight.ptr<float>(row) + first) * (column_falloff * falloff(v));
+    const FloatLanes wl = w * left, wr = w * right, wg = w * slope;
+    const FloatLanes wgg = wg * slope, wgl = wg * left, wgr = wg * right;
+    n += w, l += wl, r += wr, g += wg, gv += wg * v;
+    ll += wl * left, rr += wr * right, lr += wl * right;
+    gg += wgg, ggv += wgg * v, ggvv += wgg * (v * v);
+    gl += wgl, glv += wgl * v, gr += wgr, grv += wgr * v;
   }
-  if (agreeing < kLeastAgreement * all || agreeing < kLeastNeighbours) return std::nullopt;
-  Eigen::Matrix<float, 6, 6> A = Eigen::Matrix<float, 6, 6>::Zero();
-  for (int k = 0, at = 0; k < 6; ++k)
-    for (int m = 0; m <= k; ++m) A(k, m) = products[at++];
-  // A weak belief in what the cell itself says where its neighbours are few: slopes to 0.1, curvatures to 0.005 / px.
-  A.diagonal() += (Vector6() << 0, 100, 100, 40000, 40000, 40000).finished();
-  return A.selfadjointView<Eigen::Lower>().llt().solve(Eigen::Map<const Vector6>(sums));
+  WindowSums sums;
+  sums.n = total(n), sums.l = total(l), sums.r = total(r);
+  sums.ll = total(ll), sums.rr = total(rr), sums.lr = total(lr);
+  sums.g = total(g), sums.gu = total(g * kColumn), sums.gv = total(gv);
+  sums.gg = total(gg), sums.ggu = total(gg * kColumn), sums.ggv = total(ggv);
+  sums.gguu = total(gg * kColumn * kColumn), sums.gguv = total(ggv * kColumn), sums.ggvv = total(ggvv);
+  sums.gl = total(gl), sums.glu = total(gl * kColumn), sums.glv = total(glv);
+  sums.gr = total(gr), sums.gru = total(gr * kColumn), sums.grv = total(grv);
+  return sums;
+}
+
+constexpr float full_weight() {
+  float sum = 0;
+  for (int i = -kRadius; i <= kRadius; ++i) sum += falloff(static_cast<float>(i));
+  return sum * sum;
+}
+
+void refine_cell(const Superposed& images, cv::Point at, Cell& cell) {
+  const WindowSums sums = sums_around(images, at.x, at.y);
+  cell.matched = sums.n > kLeastShare * full_weight() && sums.gg > kLeastGradient * sums.n;
+  Eigen::Vector3f step;
+  if (!cell.matched || !(cell.matched = sums.solve(step, cell.correlation, cell.information))) return;
+  cell.plane.d += step[0];
+  cell.plane.dx += step[1];
+  cell.plane.dy += step[2];
+  cell.matched = cell.correlation > kLeastCorrelation && std::abs(step[0]) <= kMostStep_px &&
+                 std::abs(cell.plane.dx) <= kSteepest && std::abs(cell.plane.dy) <= kSteepest;
 }
 
 }  // namespace
 
-void smooth_cells(CellGrid& grid) {
-  // A window reports the disparity of a curved surface wrong by half its second moment times the curvature.
-  constexpr float moment = (RefineWindow::kRadius + 1) * (RefineWindow::kRadius + 1) / 5.0f;
-  const std::vector<Cell> before = grid.cells;
-  const std::vector<Neighbour> around = neighbourhood();
+void refine_cells(const Level& left, const Level& right, CellGrid& grid) {
+  const Superposed images = superpose(left, right, disparity_between_cells(grid, left.size));
   tbb::parallel_for(0, grid.rows, [&](int row) {
-    for (int column = 0; column < grid.columns; ++column) {
-      Cell& cell = grid.at(column, row);
-      if (!cell.matched) continue;
-      const std::optional<Vector6> change = fit_quadratic(grid, before, around, column, row);
-      cell.matched = change.has_value();
-      if (!change) continue;
-      cell.plane.d += (*change)[0] - 0.5f * moment * ((*change)[3] + (*change)[5]);
-      cell.plane.dx += (*change)[1];
-      cell.plane.dy += (*change)[2];
-    }
+    for (int column = 0; column < grid.columns; ++column)
+      if (Cell& cell = grid.at(column, row); cell.matched)
+        refine_cell(images, {column * CellGrid::kStep_px, row * CellGrid::kStep_px}, cell);
   });
 }
 

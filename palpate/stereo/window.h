@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "palpate/stereo/lanes.h"
+
 namespace palpate {
 
 /// Disparity around a pixel as a plane: d + dx u + dy v at (u, v) px from it. Slopes are the same at every image size.
@@ -41,39 +43,62 @@ struct WindowFit {
   float information = 0;   ///< gradient energy over residual variance, 1/px^2: inverse variance of d (Cramer-Rao)
 };
 
-/// The window of one pixel: grey levels, gradient and weights, kept in rows of `Lanes` values (one or two vector
-/// registers; the last lane has no weight) so that the compiler turns the inner loops into vector instructions.
-template <int Lanes>
+/// What the sums over a window say: the step of the plane that Gauss-Newton takes on
+/// sum w (L - gain R - offset)^2 with gain and offset free, the correlation before it and the information after it.
+struct WindowSums {
+  float n = 0, l = 0, r = 0, ll = 0, rr = 0, lr = 0;             // of w, w L, w R, ...
+  float g = 0, gu = 0, gv = 0;                                   // of w g, w g u, ...; g = slope of the images
+  float gg = 0, ggu = 0, ggv = 0, gguu = 0, gguv = 0, ggvv = 0;  // of w g g, ...
+  float gl = 0, glu = 0, glv = 0, gr = 0, gru = 0, grv = 0;      // of w g L, ...
+
+  /// False where one of the windows shows nothing or they have nothing in common.
+  bool solve(Eigen::Vector3f& step, float& correlation, float& information) const {
+    // A weak belief in the predicted slopes: a deviation of 0.03, against noise of one grey level.
+    constexpr float slope_belief = 1 / (0.03f * 0.03f);
+    const float LL = ll - l * l / n, RR = rr - r * r / n, LR = lr - l * r / n;
+    if (!(LL > 1e-3f && RR > 1e-3f && LR > 0)) return false;
+    correlation = LR / std::sqrt(LL * RR);
+    const float gain = std::sqrt(LL / RR);
+    Eigen::Matrix3f H;
+    const float h1 = ggu - g * gu / n, h2 = ggv - g * gv / n, h4 = gguv - gu * gv / n;
+    H << gg - g * g / n, h1, h2, h1, gguu - gu * gu / n + slope_belief, h4, h2, h4, ggvv - gv * gv / n + slope_belief;
+    const float residual_mean = (l - gain * r) / n;
+    const Eigen::Vector3f descent(gl - gain * gr - g * residual_mean, glu - gain * gru - gu * residual_mean,
+                                  glv - gain * grv - gv * residual_mean);
+    const Eigen::Matrix3f inverse = H.inverse();
+    step = -(inverse * descent);
+    // The residual that is left after the step.
+    const float residual = std::max(1e-3f * n, 2 * LL - 2 * gain * LR - descent.dot(inverse * descent)) / n;
+    information = 1 / (inverse(0, 0) * residual);
+    return true;
+  }
+};
+
+/// The window of one pixel, 7 x 7, kept as pairs of rows of eight (the last column and the last row have no weight).
 class Window {
  public:
-  static constexpr int kRadius = Lanes / 2 - 1;
-  static constexpr int kRows = 2 * kRadius + 1;
-  static_assert(kRadius < Level::kMargin_px);
+  static constexpr int kRadius = 3;
 
   /// False where too little of the window can be used or where the row shows no texture.
   bool cut(const Level& from, cv::Point at) {
     at_ = at;
-    Lane sums[2] = {};
-    for (int r = 0; r < kRows; ++r) {
-      const float* l = from.grey_at(at.x - kRadius, at.y + r - kRadius);
-      const float* g = from.gradient_at(at.x - kRadius, at.y + r - kRadius);
-      const float* m = from.weight_at(at.x - kRadius, at.y + r - kRadius);
-      for (int i = 0; i < Lanes; ++i) {
-        const float w = m[i] * falloff(i) * falloff(r);
-        weight_[r][i] = w;
-        grey_[r][i] = l[i];
-        gradient_[r][i] = g[i];
-        sums[0][i] += w;
-        sums[1][i] += w * g[i] * g[i];
-      }
+    middle_ = *from.grey_at(at.x, at.y);
+    FloatLanes weights = {}, energy = {};
+    for (int k = 0; k < kPairs; ++k) {
+      const int x = at.x - kRadius, y = at.y + 2 * k - kRadius;
+      weight_[k] = load_halves(from.weight_at(x, y), from.weight_at(x, y + 1)) * falloff(k);
+      grey_[k] = load_halves(from.grey_at(x, y), from.grey_at(x, y + 1)) - middle_;
+      gradient_[k] = load_halves(from.gradient_at(x, y), from.gradient_at(x, y + 1));
+      weights += weight_[k];
+      energy += weight_[k] * gradient_[k] * gradient_[k];
     }
-    const float weights = total(sums[0]);
-    return weights > kLeastShare * full_weight() && total(sums[1]) > kLeastGradient * weights;
+    const float sum = total(weights);
+    return sum > kLeastShare * kFullWeight && total(energy) > kLeastGradient * sum;
   }
 
-  /// Gauss-Newton from a predicted plane on sum w (L - gain R(x - d) - offset)^2, gain and offset free in every step,
-  /// the mean of both images' gradients as in efficient second-order minimisation. False when the window leaves the
-  /// other image or the answer leaves the prediction by more than `most_step` px.
+  /// Gauss-Newton from a predicted plane, gain and offset free in every step, the mean of both images' gradients as in
+  /// efficient second-order minimisation. False when the window leaves the other image or the answer leaves the
+  /// prediction by more than `most_step` px.
   bool fit(const Level& to, DisparityPlane predicted, float most_step, float steepest, int iterations,
            WindowFit& result) {
     result.plane = predicted;
@@ -93,25 +118,19 @@ class Window {
   }
 
  private:
-  using Lane = float[Lanes];
-  static constexpr float kLeastShare = 0.3f;      // of the window's weight
+  static constexpr int kPairs = 4;
+  static constexpr float kLeastShare = 0.2f;      // of the window's weight
   static constexpr float kLeastGradient = 0.02f;  // mean square of the gradient, grey levels per px
-  // A weak belief in the predicted slopes: a deviation of 0.03, against noise of one grey level.
-  static constexpr float kSlopeBelief = 1 / (0.03f * 0.03f);
+  static constexpr float kFullWeight = 27.5625f;
 
-  static float total(const Lane& lane) {
-    float sum = 0;
-    for (const float value : lane) sum += value;
-    return sum;
-  }
-  static constexpr float falloff(int i) {
-    const float t = static_cast<float>(i - kRadius) / static_cast<float>(kRadius + 1);
-    return i - kRadius > kRadius ? 0 : 1 - t * t;
-  }
-  static constexpr float full_weight() {
-    float sum = 0;
-    for (int i = 0; i < Lanes; ++i) sum += falloff(i);
-    return sum * sum;
+  // Columns -3..3 and nothing, twice; the row of the first half is 2 k - 3.
+  static constexpr FloatLanes kColumn = {-3, -2, -1, 0, 1, 2, 3, 4, -3, -2, -1, 0, 1, 2, 3, 4};
+  static constexpr FloatLanes kSecondRow = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+
+  static FloatLanes row_of(int k) { return kSecondRow + static_cast<float>(2 * k - kRadius); }
+  static FloatLanes falloff(int k) {
+    const FloatLanes row = row_of(k);
+    return (1 - kColumn * kColumn / 16) * (1 - row * row / 16);
   }
 
   // One look at the other image under the plane of `fit`: correlation and information there, and the step to take.
@@ -122,75 +141,50 @@ class Window {
     if (!(x0 - reach - spread > 1 - Level::kMargin_px &&
           x0 + reach + spread < static_cast<float>(to.size.width + Level::kMargin_px - 3)))
       return false;
-    Lane right[kRows], slope[kRows], weight[kRows];
-    Lane s_w = {}, s_l = {}, s_r = {}, s_g = {}, s_gu = {}, s_gv = {};
-    for (int r = 0; r < kRows; ++r) {
-      const float v = static_cast<float>(r - kRadius);
-      const float* row = to.grey_at(-Level::kMargin_px, at_.y + r - kRadius);
-      const float* mask = to.weight_at(-Level::kMargin_px, at_.y + r - kRadius);
-      const float start = x0 + Level::kMargin_px - plane.dy * v;
-      for (int i = 0; i < Lanes; ++i) {
-        const float u = static_cast<float>(i - kRadius);
-        const float x = start + u * (1 - plane.dx);
-        const int whole = static_cast<int>(x);
-        const float t = x - static_cast<float>(whole);
-        // Catmull-Rom and its derivative.
-        const float a = row[whole - 1], b = row[whole], c = row[whole + 1], d = row[whole + 2];
-        const float c1 = 0.5f * (c - a), c2 = a - 2.5f * b + 2 * c - 0.5f * d, c3 = 0.5f * (d - a) + 1.5f * (b - c);
-        const float w = weight_[r][i] * mask[static_cast<int>(x + 0.5f)];
-        const float value = b + t * (c1 + t * (c2 + t * c3));
-        const float g = 0.5f * (gradient_[r][i] + c1 + t * (2 * c2 + 3 * t * c3));
-        right[r][i] = value;
-        slope[r][i] = g;
-        weight[r][i] = w;
-        s_w[i] += w;
-        s_l[i] += w * grey_[r][i];
-        s_r[i] += w * value;
-        s_g[i] += w * g;
-        s_gu[i] += w * g * u;
-        s_gv[i] += w * g * v;
-      }
+    const int stride = static_cast<int>(to.grey.step1());
+    const IntLanes second_row = __builtin_convertvector(kSecondRow, IntLanes) * stride;
+    FloatLanes n = {}, l = {}, r = {}, ll = {}, rr = {}, lr = {}, g = {}, gv = {}, gg = {}, ggv = {}, ggvv = {};
+    FloatLanes gl = {}, glv = {}, gr = {}, grv = {};
+    for (int k = 0; k < kPairs; ++k) {
+      const int y = at_.y + 2 * k - kRadius;
+      const float* row = to.grey_at(-Level::kMargin_px, y);
+      const float* mask = to.weight_at(-Level::kMargin_px, y);
+      const FloatLanes v = row_of(k);
+      const FloatLanes x = x0 + Level::kMargin_px - plane.dy * v + kColumn * (1 - plane.dx);
+      const IntLanes whole = __builtin_convertvector(x, IntLanes);
+      const FloatLanes t = x - __builtin_convertvector(whole, FloatLanes);
+      const IntLanes index = whole + second_row;
+      // Catmull-Rom and its derivative.
+      const FloatLanes a = gather(row - 1, index), b = gather(row, index), c = gather(row + 1, index),
+                       d = gather(row + 2, index);
+      const FloatLanes c1 = 0.5f * (c - a), c2 = a - 2.5f * b + 2 * c - 0.5f * d, c3 = 0.5f * (d - a) + 1.5f * (b - c);
+      const FloatLanes other = b + t * (c1 + t * (c2 + t * c3)) - middle_;
+      const FloatLanes slope = 0.5f * (gradient_[k] + c1 + t * (2 * c2 + 3 * t * c3));
+      const FloatLanes w = weight_[k] * gather(mask, index);
+      const FloatLanes wl = w * grey_[k], wr = w * other, wg = w * slope, wgg = wg * slope;
+      const FloatLanes wgl = wg * grey_[k], wgr = wg * other;
+      n += w, l += wl, r += wr, g += wg, gv += wg * v;
+      ll += wl * grey_[k], rr += wr * other, lr += wl * other;
+      gg += wgg, ggv += wgg * v, ggvv += wgg * v * v;
+      gl += wgl, glv += wgl * v, gr += wgr, grv += wgr * v;
     }
-    const float n = total(s_w);
-    if (n < kLeastShare * full_weight()) return false;
-    const float mean_l = total(s_l) / n, mean_r = total(s_r) / n;
-    const float mean_g = total(s_g) / n, mean_gu = total(s_gu) / n, mean_gv = total(s_gv) / n;
-    Lane ll = {}, rr = {}, lr = {}, h[6] = {}, jl[3] = {}, jr[3] = {};
-    for (int r = 0; r < kRows; ++r) {
-      const float v = static_cast<float>(r - kRadius);
-      for (int i = 0; i < Lanes; ++i) {
-        const float u = static_cast<float>(i - kRadius);
-        const float w = weight[r][i], l = grey_[r][i] - mean_l, m = right[r][i] - mean_r;
-        const float a = slope[r][i] - mean_g, b = slope[r][i] * u - mean_gu, c = slope[r][i] * v - mean_gv;
-        const float wa = w * a, wb = w * b, wc = w * c, wl = w * l, wm = w * m;
-        ll[i] += wl * l, rr[i] += wm * m, lr[i] += wl * m;
-        h[0][i] += wa * a, h[1][i] += wa * b, h[2][i] += wa * c;
-        h[3][i] += wb * b, h[4][i] += wb * c, h[5][i] += wc * c;
-        jl[0][i] += wa * l, jl[1][i] += wb * l, jl[2][i] += wc * l;
-        jr[0][i] += wa * m, jr[1][i] += wb * m, jr[2][i] += wc * m;
-      }
-    }
-    const float LL = total(ll), RR = total(rr), LR = total(lr);
-    if (!(LL > 1e-3f && RR > 1e-3f && LR > 0)) return false;
-    fit.correlation = LR / std::sqrt(LL * RR);
-    const float gain = std::sqrt(LL / RR);
-    Eigen::Matrix3f H;
-    const float h1 = total(h[1]), h2 = total(h[2]), h4 = total(h[4]);
-    H << total(h[0]), h1, h2, h1, total(h[3]) + kSlopeBelief, h4, h2, h4, total(h[5]) + kSlopeBelief;
-    const Eigen::Vector3f descent(total(jl[0]) - gain * total(jr[0]), total(jl[1]) - gain * total(jr[1]),
-                                  total(jl[2]) - gain * total(jr[2]));
-    const Eigen::Matrix3f inverse = H.inverse();
-    step = -(inverse * descent);
-    // The residual that is left after the step.
-    const float residual = std::max(1e-3f * n, 2 * LL - 2 * gain * LR - descent.dot(inverse * descent)) / n;
-    fit.information = 1 / (inverse(0, 0) * residual);
-    return true;
+    WindowSums sums;
+    sums.n = total(n);
+    if (sums.n < kLeastShare * kFullWeight) return false;
+    sums.l = total(l), sums.r = total(r), sums.ll = total(ll), sums.rr = total(rr), sums.lr = total(lr);
+    sums.g = total(g), sums.gu = total(g * kColumn), sums.gv = total(gv);
+    sums.gg = total(gg), sums.ggu = total(gg * kColumn), sums.ggv = total(ggv);
+    sums.gguu = total(gg * kColumn * kColumn), sums.gguv = total(ggv * kColumn), sums.ggvv = total(ggvv);
+    sums.gl = total(gl), sums.glu = total(gl * kColumn), sums.glv = total(glv);
+    sums.gr = total(gr), sums.gru = total(gr * kColumn), sums.grv = total(grv);
+    return sums.solve(step, fit.correlation, fit.information);
   }
 
   cv::Point at_;
-  Lane grey_[kRows];
-  Lane gradient_[kRows];
-  Lane weight_[kRows];
+  float middle_ = 0;
+  FloatLanes grey_[kPairs];
+  FloatLanes gradient_[kPairs];
+  FloatLanes weight_[kPairs];
 };
 
 }  // namespace palpate
