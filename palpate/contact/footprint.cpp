@@ -22,12 +22,12 @@ constexpr double kLeastIndependentPart = 0.1;
 constexpr int kRings = 8, kRingPoints = 24;
 /// Up to which degree the disc is tied, and what that adds: on triangles with edges h it acts like one larger by
 /// `growth_per_edge` times h: what makes the force of flat punches on averaged elements that of a fine mesh (h between
-/// 0.2 and 0.7 of the radius, nu between 0.3 and 0.49; single meshes differ by 0.05).
+/// 0.2 and 0.7 of the radius, nu between 0.3 and 0.49; single meshes differ by 0.06).
 struct Order {
   int degree;
   double growth_per_edge;
 };
-constexpr std::array<Order, 5> kOrders = {{{7, 0.50}, {5, 0.46}, {3, 0.36}, {1, 0.28}, {0, 0.28}}};
+constexpr std::array<Order, 5> kOrders = {{{7, 0.50}, {5, 0.46}, {3, 0.39}, {1, 0.30}, {0, 0.30}}};
 /// Of the radius, what that correction leaves at least.
 constexpr double kLeastRadiusShare = 0.3;
 
