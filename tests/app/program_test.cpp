@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
@@ -8,8 +9,10 @@
 #include <set>
 #include <sstream>
 
+#include "palpate/core/mesh_files.h"
 #include "palpate/feedback/forces_file.h"
 #include "palpate/feedback/warnings.h"
+#include "palpate/simulate/organ_shape.h"
 #include "palpate/stereo/rig.h"
 #include "tests/app/program.h"
 #include "tests/support/reference_data.h"
@@ -186,6 +189,26 @@ TEST(Readme, ItsExampleIsTheOneThatIsCompiledAndItRuns) {
   const Outcome outcome = run(PALPATE_EXAMPLE_FORCES, (workspace / "in/scene.yaml").string());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.error;
   EXPECT_EQ(outcome.output, "1 tool_lost 0.000 N\n2 tool_lost 0.000 N\n3 tool_lost 0.000 N\n");
+}
+
+TEST(ElasticPage, ItsExampleIsTheOneThatIsCompiledAndItRuns) {
+  const std::filesystem::path source = PALPATE_SOURCE_DIR;
+  EXPECT_THAT(read_file(source / "docs/elastic.md"), HasSubstr(read_file(source / "examples/punch.cpp")));
+  const Workspace workspace;
+  SimulatedBody body;
+  body.shape = "pear";
+  body.size_mm = {62, 48, 44};
+  write_ply(workspace / "organ.ply", make_organ(body, 2000));
+  const Outcome outcome = run(PALPATE_EXAMPLE_PUNCH, (workspace / "organ.ply").string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.error;
+  double force_N[4] = {};
+  ASSERT_EQ(std::sscanf(outcome.output.c_str(),
+                        "0.5 mm: %lf N, a little deeper %*f N/mm more\n1.0 mm: %lf N, a little deeper %*f N/mm more\n"
+                        "1.5 mm: %lf N, a little deeper %*f N/mm more\n2.0 mm: %lf N",
+                        &force_N[0], &force_N[1], &force_N[2], &force_N[3]),
+            4)
+      << outcome.output;
+  EXPECT_GT(force_N[3], 4 * force_N[0]);
 }
 
 TEST(Program, TheScenePageIsWhatTheProgramSaysOfItself) {
