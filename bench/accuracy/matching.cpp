@@ -115,16 +115,17 @@ DisparityMap by_us(const TruthCase& c) {
 void print_row(const TruthCase& c, const std::string& matcher, const Timed& result) {
   const MatchScore s = score(result.map, c);
   const bool tells_deviation = !result.map.deviation_px.empty();
-  fmt::print("| {} | {} | {:.3f} | {:.3f} | {:.2f} | {:.1f} | {} | {} | {} | {:.0f} | {:.0f} |\n", c.name, matcher,
+  fmt::print("| {} | {} | {:.3f} | {:.3f} | {:.2f} | {:.1f} | {} | {} | {} | {} | {:.0f} | {:.0f} |\n", c.name, matcher,
              s.mean_px, s.median_px, 100 * s.above_one_px, 100 * s.covered,
              c.metric ? fmt::format("{:.3f}", s.mean_mm) : "-", c.metric ? fmt::format("{:.3f}", s.median_mm) : "-",
-             tells_deviation ? fmt::format("{:.2f}", s.within_one_deviation) : "-", result.cpu_ms, result.wall_ms);
+             tells_deviation ? fmt::format("{:.2f}", s.within_one_deviation) : "-",
+             tells_deviation ? fmt::format("{:.2f}", s.within_both_deviations) : "-", result.cpu_ms, result.wall_ms);
   std::fflush(stdout);
 }
 
 void print_goal(const TruthCase& c) {
   const Goal goal = goal_of(c.name);
-  fmt::print("| {} | *goal* | *{:.2f}* | *{:.2f}* | *{:.1f}* | *{:.0f}* | | | *0.58-0.78* | | |\n", c.name,
+  fmt::print("| {} | *goal* | *{:.2f}* | *{:.2f}* | *{:.1f}* | *{:.0f}* | | | | *0.58-0.78* | | |\n", c.name,
              goal.mean_px, goal.median_px, 100 * goal.above_one_px, 100 * goal.covered);
 }
 
@@ -146,7 +147,7 @@ void write_error_picture(const TruthCase& c, const DisparityMap& map, const std:
 void print_accuracy(const std::vector<TruthCase>& cases, bool ours_alone, const std::filesystem::path& pictures) {
   fmt::print(
       "| case | matcher | mean px | median px | > 1 px, % | covered, % | mean mm | median mm | within one deviation | "
-      "CPU ms | wall ms |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "with the truth's own | CPU ms | wall ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const TruthCase& c : cases) {
     print_goal(c);
     const Timed ours = timed([&] { return by_us(c); }, 5);

@@ -10,8 +10,6 @@ namespace palpate {
 namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-// Neighbouring residuals are alike (video compression, reflections), which smoothing over cells about makes up for.
-constexpr float kNoiseSpread = 1.1f;
 
 // Difference of two small windows without their means, grey levels; large where the right one leaves the image.
 float window_difference(const Eyes& eyes, cv::Point at, float disparity) {
@@ -149,7 +147,7 @@ DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
         if (std::isnan(guess.disparity)) continue;
         if (competition) guess = compete(eyes, grid, {x, y}, guess);
         map.disparity_px.at<float>(y, x) = guess.disparity;
-        map.deviation_px.at<float>(y, x) = deviation_px(guess.information, kNoiseSpread);
+        map.deviation_px.at<float>(y, x) = deviation_px(guess.information);
         map.correlation.at<float>(y, x) = guess.correlation;
       }
     }

@@ -17,6 +17,7 @@ namespace palpate {
 namespace {
 
 constexpr int kLeastSeeds = 8;
+constexpr double kWarnedRowOffset_px = 0.5;
 
 // Left and right are swapped when many more corners are found again behind infinity than in front of it.
 void check_seeds(const Eyes& eyes, const Seeds& seeds, double least, double most) {
@@ -75,6 +76,20 @@ cv::Mat disparity_by_dis(const Eyes& eyes, double least, double most) {
   return disparity;
 }
 
+// What the seeds say about the calibration.
+void take_over(const Seeds& seeds, DisparityMap& map) {
+  map.row_offset_px = seeds.row_offset_px;
+  map.calibration_deviation_px = seeds.calibration_deviation_px;
+  const double square = seeds.calibration_deviation_px * seeds.calibration_deviation_px;
+  cv::Mat squares = map.deviation_px.mul(map.deviation_px) + square;
+  cv::sqrt(squares, map.deviation_px);
+  if (std::abs(seeds.row_offset_px) > kWarnedRowOffset_px)
+    map.warnings.push_back(fmt::format(
+        "the rows of left and right do not match: the right image lies {:.1f} px {}; this was corrected, but the "
+        "calibration is off by about as much along the row, where it cannot be seen; calibrate again",
+        std::abs(seeds.row_offset_px), seeds.row_offset_px > 0 ? "lower" : "higher"));
+}
+
 }  // namespace
 
 void describe(Settings& settings, MatchOptions& options) {
@@ -113,7 +128,7 @@ DisparityMap match(const RectifiedPair& pair, const Rectification& rectification
       map = measure(eyes, disparity_by_dis(eyes, least, most));
       break;
   }
-  map.row_offset_px = seeds.row_offset_px;
+  take_over(seeds, map);
   return map;
 }
 

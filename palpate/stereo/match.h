@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
 #include "palpate/stereo/rig.h"
@@ -20,9 +23,11 @@ void describe(Settings& settings, MatchOptions& options);
 /// Disparity of the rectified left image, left x minus right x, px. All maps have the size of the image.
 struct DisparityMap {
   cv::Mat disparity_px;      ///< CV_32F, NaN where nothing was matched
-  cv::Mat deviation_px;      ///< CV_32F, one standard deviation of the disparity
+  cv::Mat deviation_px;      ///< CV_32F, one standard deviation of the disparity, the calibration's part in it
   cv::Mat correlation;       ///< CV_32F, ZNCC -1..1
   double row_offset_px = 0;  ///< matches lie this many rows lower in the right image (corrected for before matching)
+  double calibration_deviation_px = 0;     ///< the part of every deviation that the calibration's error makes
+  std::vector<std::string> warnings = {};  ///< sentences for the person at the screen
 };
 
 /// Dense disparity of a rectified pair where `mask` (8-bit, size of the image) is not zero, by the matcher that the

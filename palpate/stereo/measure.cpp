@@ -61,7 +61,8 @@ DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px) {
       const float residual = std::max(1e-3f, 2 * a * (1 - correlation));
       map.disparity_px.at<float>(y, x) = disparity_px.at<float>(y, x);
       map.correlation.at<float>(y, x) = correlation;
-      map.deviation_px.at<float>(y, x) = deviation_px(c * pixels * w_mean.at<float>(y, x) / residual, kNoiseSpread);
+      const float information = c * pixels * w_mean.at<float>(y, x) / residual;
+      map.deviation_px.at<float>(y, x) = deviation_px(information / (kNoiseSpread * kNoiseSpread));
     }
   return map;
 }

@@ -7,10 +7,9 @@
 
 namespace palpate {
 
-/// One standard deviation of a disparity of which a window says `information` (1/px^2): never below 0.02 px, and
-/// `noise_spread` times what independent noise would leave.
-inline float deviation_px(float information, float noise_spread) {
-  return std::sqrt(0.02f * 0.02f + noise_spread * noise_spread / information);
+/// One standard deviation of a disparity of which a window says `information` (1/px^2), never below 0.02 px.
+inline float deviation_px(float information) {
+  return std::sqrt(0.02f * 0.02f + 1 / information);
 }
 
 /// Disparity of every pixel (CV_32F) from the planes of the cells around it, NaN where none is matched.

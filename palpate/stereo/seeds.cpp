@@ -75,6 +75,31 @@ double median(std::vector<float> values) {
   return *middle;
 }
 
+// How far the rows' offset wanders over the image, px: medians over neighbouring seeds scatter more than the noise of
+// single seeds explains.
+double wandering(const std::vector<Seed>& seeds, const std::vector<float>& rows, double offset) {
+  constexpr size_t kGroup = 9;
+  // Deviation of a median of nine, of one's; with the margin by which some fifty groups scatter by chance.
+  constexpr double kToDeviation = 1.4826, kMedianOfGroup = 0.42 * 1.3;
+  if (seeds.size() < 2 * kGroup) return 0;
+  std::vector<float> about_all, about_group;
+  for (size_t i = 0; i < seeds.size(); ++i) {
+    std::vector<std::pair<float, float>> others;  // square of the distance, row
+    for (size_t k = 0; k < seeds.size(); ++k) {
+      const cv::Point2f apart = seeds[k].left_px - seeds[i].left_px;
+      others.emplace_back(apart.dot(apart), rows[k]);
+    }
+    std::nth_element(others.begin(), others.begin() + kGroup, others.end());
+    std::vector<float> group;
+    for (size_t k = 0; k < kGroup; ++k) group.push_back(others[k].second);
+    const float middle = static_cast<float>(median(group));
+    about_all.push_back(std::abs(middle - static_cast<float>(offset)));
+    about_group.push_back(std::abs(rows[i] - middle));
+  }
+  const double wander = kToDeviation * median(about_all), noise = kToDeviation * kMedianOfGroup * median(about_group);
+  return std::sqrt(std::max(0.0, wander * wander - noise * noise));
+}
+
 }  // namespace
 
 Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_disparity_px) {
@@ -108,9 +133,14 @@ Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_dispar
     rows.push_back(there[i].y - corners[i].y);
   }
   seeds.row_offset_px = median(rows);
-  for (size_t k = 0; k < kept.size(); ++k)
-    if (std::abs(rows[k] - static_cast<float>(seeds.row_offset_px)) < kMostRowScatter_px)
-      seeds.matches.push_back({corners[kept[k]], corners[kept[k]].x - there[kept[k]].x});
+  std::vector<float> rows_of_matches;
+  for (size_t k = 0; k < kept.size(); ++k) {
+    if (std::abs(rows[k] - static_cast<float>(seeds.row_offset_px)) >= kMostRowScatter_px) continue;
+    seeds.matches.push_back({corners[kept[k]], corners[kept[k]].x - there[kept[k]].x});
+    rows_of_matches.push_back(rows[k]);
+  }
+  seeds.calibration_deviation_px =
+      std::hypot(seeds.row_offset_px / std::sqrt(2), wandering(seeds.matches, rows_of_matches, seeds.row_offset_px));
   return seeds;
 }
 

@@ -16,6 +16,10 @@ struct Seeds {
   std::vector<Seed> matches;
   int corners = 0;           ///< looked for
   double row_offset_px = 0;  ///< median of right row minus left row
+  /// One standard deviation by which the calibration shifts all disparities: along the row nobody can see it, so it is
+  /// read from the rows. Half the square of their offset (seen once, against the belief that the calibration is right)
+  /// and the square of how the offset wanders over the image beyond the noise of the single matches.
+  double calibration_deviation_px = 0;
 };
 
 /// Corners matched by pyramidal Lucas-Kanade across the pair, checked both ways, whose disparity lies in

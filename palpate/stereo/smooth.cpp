@@ -15,6 +15,7 @@ constexpr int kMargin = 16;               // cells, more than any reach
 constexpr int kNear = 5;                  // cells that have to agree
 // A pixel counts in as many windows of refinement as cells stand in one.
 constexpr float kWindowsPerPixel = 11;
+constexpr float kLeastScatter = 0.25f;
 
 // The grid as planes of numbers with a margin without information, so that sixteen cells are worked on at once.
 class Planes {
@@ -114,7 +115,8 @@ FloatLanes corner_of_inverse(const FloatLanes (&L)[kProducts]) {
 // Quadratics through the neighbours of sixteen cells on the same surface, as changes of the cells' own planes.
 struct Quadratics {
   FloatLanes change[kTerms] = {};
-  FloatLanes variance = {};            // of the first of them
+  FloatLanes variance = {};            // of the first of them, if the cells scattered as they say
+  FloatLanes scatter = {};             // how much more their squares scatter about the quadratic
   FloatLanes agreeing = {}, all = {};  // neighbours near by, by weight
 };
 
@@ -122,7 +124,7 @@ Quadratics fit_quadratics(const Planes& planes, const std::vector<Neighbour>& ar
   const size_t here = planes.index(column, row);
   const FloatLanes d = load_lanes(&planes.d[here]), dx = load_lanes(&planes.dx[here]),
                    dy = load_lanes(&planes.dy[here]);
-  FloatLanes products[kProducts] = {};
+  FloatLanes products[kProducts] = {}, squares = {}, weights = {}, sums[kTerms];
   Quadratics result;
   for (const Neighbour& n : around) {
     const size_t there = planes.index(column + n.column, row + n.row);
@@ -141,6 +143,8 @@ Quadratics fit_quadratics(const Planes& planes, const std::vector<Neighbour>& ar
       result.agreeing += agrees;
     }
     const FloatLanes weight = information * agrees, weighted_off = weight * off;
+    squares += weighted_off * off;
+    weights += agrees;
     for (int k = 0; k < kTerms; ++k) {
       result.change[k] += weighted_off * n.basis[k];
       for (int m = 0; m <= k; ++m) products[at(k, m)] += weight * (n.basis[k] * n.basis[m]);
@@ -149,8 +153,11 @@ Quadratics fit_quadratics(const Planes& planes, const std::vector<Neighbour>& ar
   // A weak belief in what the cell itself says where its neighbours are few: slopes to 0.1, curvatures to 0.005 / px.
   constexpr float belief[kTerms] = {1e-3f, 100, 100, 40000, 40000, 40000};
   for (int k = 0; k < kTerms; ++k) products[at(k, k)] += belief[k];
+  std::copy(result.change, result.change + kTerms, sums);
   factorise(products);
   solve(products, result.change);
+  for (int k = 0; k < kTerms; ++k) squares -= sums[k] * result.change[k];
+  result.scatter = squares / weights;
   result.variance = corner_of_inverse(products);
   return result;
 }
@@ -173,7 +180,9 @@ void smooth_cells(CellGrid& grid, Reach reach) {
         cell.plane.dx += quadratics.change[1][lane];
         cell.plane.dy += quadratics.change[2][lane];
         const float windows = kWindowsPerPixel / static_cast<float>(reach.step * reach.step);
-        cell.information = std::min(1e6f, 1 / (std::max(1.0f, windows) * quadratics.variance[lane]));
+        cell.information =
+            std::min(1e6f, 1 / (std::max(1.0f, windows) * std::max(kLeastScatter, quadratics.scatter[lane]) *
+                                quadratics.variance[lane]));
       }
     }
   });

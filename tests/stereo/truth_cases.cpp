@@ -102,6 +102,19 @@ double mean_of(const std::vector<double>& values) {
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
+// How far the truth lies from the middle between its neighbours four px on either side, where on a plane it would lie:
+// structured light comes in steps.
+double scatter_of(const cv::Mat& truth_px, const cv::Mat& scored) {
+  constexpr int k = 4;
+  std::vector<double> off;
+  for (int y = 0; y < truth_px.rows; ++y)
+    for (int x = k; x + k < truth_px.cols; ++x)
+      if (scored.at<uchar>(y, x - k) && scored.at<uchar>(y, x) && scored.at<uchar>(y, x + k))
+        off.push_back(
+            std::abs(truth_px.at<float>(y, x) - 0.5f * (truth_px.at<float>(y, x - k) + truth_px.at<float>(y, x + k))));
+  return 1.4826 / std::sqrt(1.5) * median_of(std::move(off));
+}
+
 }  // namespace
 
 const std::vector<std::string>& truth_case_names() {
@@ -115,13 +128,14 @@ TruthCase read_truth_case(const std::string& name) {
                      : name == "motorcycle"    ? read_motorcycle(folder)
                                                : read_rendered(folder);
   result.name = name;
+  result.truth_deviation_px = scatter_of(result.truth_px, result.scored);
   return result;
 }
 
 MatchScore score(const DisparityMap& map, const TruthCase& truth) {
   const double focal_baseline = truth.rectification.focal_px * truth.rectification.baseline_mm;
   std::vector<double> errors_px, errors_mm;
-  int above = 0, within = 0;
+  int above = 0, within = 0, within_both = 0;
   for (int y = 0; y < truth.truth_px.rows; ++y)
     for (int x = 0; x < truth.truth_px.cols; ++x) {
       const double d = map.disparity_px.at<float>(y, x), t = truth.truth_px.at<float>(y, x);
@@ -130,7 +144,9 @@ MatchScore score(const DisparityMap& map, const TruthCase& truth) {
       errors_px.push_back(error);
       errors_mm.push_back(std::abs(focal_baseline / (d + truth.shift_px) - focal_baseline / (t + truth.shift_px)));
       above += error > 1;
-      within += !map.deviation_px.empty() && error < map.deviation_px.at<float>(y, x);
+      const double deviation = map.deviation_px.empty() ? 0 : map.deviation_px.at<float>(y, x);
+      within += error < deviation;
+      within_both += error < std::hypot(deviation, truth.truth_deviation_px);
     }
   MatchScore result;
   const double count = std::max<double>(1, static_cast<double>(errors_px.size()));
@@ -140,6 +156,7 @@ MatchScore score(const DisparityMap& map, const TruthCase& truth) {
   result.median_mm = median_of(std::move(errors_mm));
   result.above_one_px = above / count;
   result.within_one_deviation = within / count;
+  result.within_both_deviations = within_both / count;
   result.covered = count / std::max(1, cv::countNonZero(truth.scored));
   return result;
 }
