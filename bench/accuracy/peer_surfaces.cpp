@@ -100,7 +100,7 @@ Surface poisson(const std::vector<Vec3>& points_mm, double spacing_mm) {
   for (auto& [point, normal] : points)
     if (normal * (point - CGAL::ORIGIN) > 0) normal = -normal;
   CGAL::Surface_mesh<Point> mesh;
-  constexpr double kAngle_deg = 20, kTriangle = 2, kChord = 0.2;  // of the triangles; the last two in spacings
+  constexpr double kAngle_deg = 20, kTriangle = 30, kChord = 0.2;  // of the triangles; the last two in spacings
   // CGAL's surface mesher gives up on some inputs.
   try {
     if (!CGAL::poisson_surface_reconstruction_delaunay(points.begin(), points.end(), point_map, normal_map, mesh,
@@ -112,15 +112,14 @@ Surface poisson(const std::vector<Vec3>& points_mm, double spacing_mm) {
   Surface surface;
   for (const auto v : mesh.vertices())
     surface.vertices_mm.emplace_back(mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z());
+  std::vector<char> near;
+  for (const Vec3& v : surface.vertices_mm) near.push_back(is_near(v, points_mm, 2 * spacing_mm));
   for (const auto f : mesh.faces()) {
     Triangle t{};
     size_t k = 0;
-    Vec3 middle = Vec3::Zero();
-    for (const auto v : CGAL::vertices_around_face(mesh.halfedge(f), mesh)) {
-      t[k++] = static_cast<int>(v);
-      middle += surface.vertices_mm[v] / 3;
-    }
-    if (is_near(middle, points_mm, 2 * spacing_mm)) surface.triangles.push_back(t);
+    for (const auto v : CGAL::vertices_around_face(mesh.halfedge(f), mesh)) t[k++] = static_cast<int>(v);
+    if (std::all_of(t.begin(), t.end(), [&](int v) { return near[static_cast<size_t>(v)]; }))
+      surface.triangles.push_back(t);
   }
   return without_unused_vertices(surface);
 }

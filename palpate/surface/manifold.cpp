@@ -13,6 +13,7 @@ namespace {
 
 // Below this cosine between normal and viewing ray a triangle is seen edge-on and has no camera side.
 constexpr double kEdgeOn = 0.02;
+constexpr double kFlatCosine = -0.5;  // 120 degrees
 
 uint64_t directed(int a, int b) {
   return static_cast<uint64_t>(static_cast<uint32_t>(a)) << 32 | static_cast<uint32_t>(b);
@@ -220,6 +221,36 @@ bool remove_smaller_fans(size_t points, std::vector<Triangle>& triangles) {
   return any;
 }
 
+/// Flat triangles whose longest side lies on the rim: they add nothing but a bad normal. Taking one away frees its
+/// third corner, which therefore must not lie on the rim already. Returns whether anything was removed.
+bool trim_rim(const std::vector<Vec3>& points, std::vector<Triangle>& triangles) {
+  std::unordered_set<uint64_t> edges;
+  for (const Triangle& t : triangles)
+    for (size_t k = 0; k < 3; ++k) edges.insert(directed(t[k], t[(k + 1) % 3]));
+  std::vector<char> on_rim(points.size(), 0);
+  const auto is_open = [&](int a, int b) { return !edges.count(directed(b, a)); };
+  for (const Triangle& t : triangles)
+    for (size_t k = 0; k < 3; ++k)
+      if (is_open(t[k], t[(k + 1) % 3]))
+        on_rim[static_cast<size_t>(t[k])] = on_rim[static_cast<size_t>(t[(k + 1) % 3])] = 1;
+  size_t kept = 0;
+  for (const Triangle& t : triangles) {
+    bool is_flat = false;
+    for (size_t k = 0; k < 3 && !is_flat; ++k) {
+      const int a = t[k], b = t[(k + 1) % 3], apex = t[(k + 2) % 3];
+      if (!is_open(a, b) || on_rim[static_cast<size_t>(apex)]) continue;
+      const Vec3 to_a = (points[static_cast<size_t>(a)] - points[static_cast<size_t>(apex)]).normalized(),
+                 to_b = (points[static_cast<size_t>(b)] - points[static_cast<size_t>(apex)]).normalized();
+      is_flat = to_a.dot(to_b) < kFlatCosine;
+      if (is_flat) on_rim[static_cast<size_t>(apex)] = 1;
+    }
+    if (!is_flat) triangles[kept++] = t;
+  }
+  const bool any = kept < triangles.size();
+  triangles.resize(kept);
+  return any;
+}
+
 }  // namespace
 
 std::vector<Triangle> extract_manifold(const std::vector<Vec3>& points_mm, const std::vector<Triangle>& candidates) {
@@ -241,6 +272,8 @@ std::vector<Triangle> extract_manifold(const std::vector<Vec3>& points_mm, const
   std::vector<Triangle> triangles = walk.components();
   do triangles = largest_component(triangles);
   while (remove_smaller_fans(points_mm.size(), triangles));
+  while (trim_rim(points_mm, triangles)) {
+  }
   return triangles;
 }
 
