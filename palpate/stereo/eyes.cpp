@@ -14,6 +14,7 @@ constexpr int kSaturated = 235;  // a highlight is bright in every channel
 constexpr int kBlack = 14;       // the border of the scope, and nothing lit
 constexpr int kOutshine = 100;   // grey levels above the surroundings
 constexpr int kSurroundings_px = 61;
+constexpr double kLeastRowOffset_px = 0.02;
 constexpr int kHalo_px = 5;  // highlights shine into their neighbourhood
 
 // Black that touches the rim of the image.
@@ -69,14 +70,19 @@ Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::M
   return eyes;
 }
 
+cv::Mat rows_aligned(const cv::Mat& right, double row_offset_px) {
+  if (std::abs(row_offset_px) < kLeastRowOffset_px) return right;
+  cv::Mat aligned;
+  cv::warpAffine(right, aligned, cv::Matx23d(1, 0, 0, 0, 1, row_offset_px), right.size(),
+                 cv::INTER_CUBIC | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  return aligned;
+}
+
 void align_rows(Eyes& eyes, double row_offset_px) {
-  if (std::abs(row_offset_px) < 0.02) return;
-  const cv::Matx23d right_from_aligned(1, 0, 0, 0, 1, row_offset_px);
-  const int from_destination = cv::WARP_INVERSE_MAP;
-  cv::warpAffine(eyes.right, eyes.right, right_from_aligned, eyes.right.size(), cv::INTER_CUBIC | from_destination,
-                 cv::BORDER_REPLICATE);
-  cv::warpAffine(eyes.right_mask, eyes.right_mask, right_from_aligned, eyes.right_mask.size(),
-                 cv::INTER_NEAREST | from_destination);
+  eyes.right = rows_aligned(eyes.right, row_offset_px);
+  if (std::abs(row_offset_px) < 0.5) return;
+  cv::warpAffine(eyes.right_mask, eyes.right_mask, cv::Matx23d(1, 0, 0, 0, 1, row_offset_px), eyes.right_mask.size(),
+                 cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
 }
 
 }  // namespace palpate

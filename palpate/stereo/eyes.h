@@ -17,6 +17,9 @@ struct Eyes {
 /// `mask` (8-bit) is where the left image is wanted.
 Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask);
 
+/// A right image moved up by `row_offset_px`.
+cv::Mat rows_aligned(const cv::Mat& right, double row_offset_px);
+
 /// The right image and its mask moved up by `row_offset_px`, so that its rows match those of the left one.
 void align_rows(Eyes& eyes, double row_offset_px);
 

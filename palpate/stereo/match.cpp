@@ -9,6 +9,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/network.h"
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/refine.h"
 #include "palpate/stereo/seeds.h"
@@ -126,6 +127,10 @@ DisparityMap match(const RectifiedPair& pair, const Rectification& rectification
       break;
     case Matcher::dis:
       map = measure(eyes, disparity_by_dis(eyes, least, most));
+      break;
+    case Matcher::network:
+      map = measure(eyes,
+                    disparity_by_network(pair.left, rows_aligned(pair.right, seeds.row_offset_px), options.network));
       break;
   }
   take_over(seeds, map);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -9,12 +10,13 @@
 
 namespace palpate {
 
-enum class Matcher { quasi_dense, sgbm, dis };
+enum class Matcher { quasi_dense, sgbm, dis, network };
 
 struct MatchOptions {
   Matcher matcher = Matcher::quasi_dense;
-  double nearest_mm = 25;    ///< closest depth searched
-  double farthest_mm = 400;  ///< farthest depth searched
+  std::filesystem::path network;  ///< ONNX file of Matcher::network, see network.h
+  double nearest_mm = 25;         ///< closest depth searched
+  double farthest_mm = 400;       ///< farthest depth searched
 };
 
 /// Keys of `map` that belong to matching.
