@@ -6,6 +6,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <tbb/task_arena.h>
+
 #include <limits>
 #include <stdexcept>
 
@@ -32,8 +34,8 @@ struct RayScene::Tree {
   std::vector<RTCGeometry> geometries;
 
   Tree() {
-    // The tree is built by one thread: it must not depend on how many there are.
-    device = rtcNewDevice("threads=1");
+    // Not "threads=1": with it Embree would hold every other parallel loop of the process to one thread, too.
+    device = rtcNewDevice(nullptr);
     if (device == nullptr) throw std::runtime_error("ray tracing: Embree cannot start");
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST));
@@ -75,7 +77,8 @@ void RayScene::place(int surface, const std::vector<Vec3>& vertices_mm) {
 }
 
 void RayScene::commit() {
-  rtcCommitScene(tree_->scene);
+  // Built by one thread: the tree must not depend on how many there are.
+  tbb::task_arena(1).execute([this] { rtcJoinCommitScene(tree_->scene); });
 }
 
 RayHit RayScene::first_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const {
