@@ -1,5 +1,6 @@
 #include "palpate/instrument/patch_cells.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -151,26 +152,38 @@ CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, i
   const float offset = cell.outline || inside == 0 ? 0 : sum / static_cast<float>(inside);
 
   CellEquations e;
-  float xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0, xr = 0, yr = 0, r1 = 0, w1 = 0, rr = 0, kept = 0, full = 0;
+  Eigen::Matrix2f normal = Eigen::Matrix2f::Zero();
+  Eigen::Vector2f right = Eigen::Vector2f::Zero();
+  Eigen::Matrix4f light_normal = 1e-3f * Eigen::Matrix4f::Identity();
+  Eigen::Vector4f light_right = Eigen::Vector4f::Zero();
+  Eigen::Matrix<float, 2, 4> cross = Eigen::Matrix<float, 2, 4>::Zero();
+  float rr = 0, kept = 0, full = 0, w1 = 0;
+  const float per_length = scale * 2.0f / kCell;
   for (size_t i = 0; i < cell.samples.size(); ++i) {
     const CellSample& s = cell.samples[i];
-    const float gx = per_noise * s.gradient_x, gy = per_noise * s.gradient_y;
-    const float energy = gx * gx + gy * gy;
-    full += energy;
+    const Eigen::Vector2f g = per_noise * Eigen::Vector2f(s.gradient_x, s.gradient_y);
+    full += g.squaredNorm();
     if (residual[i] == kOutside) continue;
     const float r = residual[i] - offset;
     const float w = 1 / (1 + r * r / (kOutlierAt * kOutlierAt));
-    kept += w * energy;
-    xx += w * gx * gx, xy += w * gx * gy, yy += w * gy * gy;
-    x1 += w * gx, y1 += w * gy, r1 += w * r, w1 += w;
-    xr += w * gx * r, yr += w * gy * r, rr += w * r * r;
+    kept += w * g.squaredNorm();
+    normal += w * g * g.transpose();
+    right += w * r * g;
+    rr += w * r * r;
+    w1 += w;
+    // What light does to a cell while it moves: brighter, and more so towards one side.
+    const Eigen::Vector4f light(1, per_length * s.dx, per_length * s.dy, s.value / 100);
+    light_normal += w * light * light.transpose();
+    light_right += w * r * light;
+    cross += w * g * light.transpose();
   }
   if (!cell.outline && w1 > 0) {
-    xx -= x1 * x1 / w1, xy -= x1 * y1 / w1, yy -= y1 * y1 / w1;
-    xr -= x1 * r1 / w1, yr -= y1 * r1 / w1;
+    const Eigen::Matrix<float, 4, 2> solved = light_normal.ldlt().solve(cross.transpose());
+    normal -= cross * solved;
+    right -= solved.transpose() * light_right;
   }
-  e.normal << xx, xy, xy, yy;
-  e.right << -xr, -yr;
+  e.normal = normal.cast<double>();
+  e.right = -right.cast<double>();
   e.information = kept;
   e.full_information = full;
   e.squared_error = rr;

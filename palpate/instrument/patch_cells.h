@@ -56,8 +56,9 @@ struct LayerNoise {
   float metal;
 };
 
-/// Lucas-Kanade's normal equations of one cell for a shift of its centre, with the cell's brightness offset eliminated
-/// and outliers weighted down. Residuals are in units of their expected noise.
+/// Lucas-Kanade's normal equations of one cell for a shift of its centre, with outliers weighted down. For brightness,
+/// offset, gain and a linear ramp over the cell are eliminated: shading stays with the light, not with the instrument.
+/// Residuals are in units of their expected noise.
 struct CellEquations {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();

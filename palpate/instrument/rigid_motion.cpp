@@ -8,19 +8,24 @@ namespace palpate {
 
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;  // translation of the tip, rotation about it
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+// Translation of the tip, rotation about it, and how far the right eye's rows have moved against the left eye's.
+constexpr int kUnknowns = 7;
+using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 // Colour is recorded at half resolution: the outline guides from afar, the texture decides.
 constexpr LayerNoise kNoise{3, 80};
 constexpr double kRotationDeviation_rad = 0.02;  // an instrument in a trocar mostly translates
+// Light slides over a round shaft as it moves, differently for each eye: a shift across the shaft, which an almost
+// level shaft would turn into a disparity many times as large.
+constexpr double kRowDeviation_px = 1.0;
 constexpr double kLeastAgreement = 0.35;
 constexpr double kLeastMetal = 0.6;
 constexpr double kCorrelatedNoise = 12;
 
 struct System {
-  Matrix6 normal = Matrix6::Zero();
-  Vector6 right = Vector6::Zero();
+  Normal normal = Normal::Zero();
+  Unknowns right = Unknowns::Zero();
   double information = 0, full_information = 0, squared_error = 0, weight = 0;
   double agreement() const { return full_information > 0 ? information / full_information : 0; }
 };
@@ -29,6 +34,8 @@ struct System {
 struct Eye {
   const Rectification& rectification;
   double shift_mm;
+
+  bool sees_row_offset() const { return shift_mm > 0; }
 
   /// Point of the keyframe's instrument at a pixel of this eye.
   Vec3 point(const InstrumentPlane& plane, const cv::Point2d& px, double height_px) const {
@@ -50,14 +57,15 @@ struct Eye {
   }
 };
 
-Vec3 moved(const Vec3& point, const Vec3& tip, const Vector6& p) {
-  return point + p.head<3>() + p.tail<3>().cross(point - tip);
+Vec3 moved(const Vec3& point, const Vec3& tip, const Unknowns& p) {
+  return point + p.head<3>() + p.segment<3>(3).cross(point - tip);
 }
 
-CellWarp warp_of(const PatchCell& cell, const Eye& eye, const InstrumentKeyframe& keyframe, const Vector6& p) {
+CellWarp warp_of(const PatchCell& cell, const Eye& eye, const InstrumentKeyframe& keyframe, const Unknowns& p) {
+  const cv::Point2d row_offset(0, eye.sees_row_offset() ? p[kUnknowns - 1] : 0);
   const auto goes_to = [&](const cv::Point2d& px) {
     const Vec3 x = eye.point(keyframe.plane, px, cell.height_px);
-    return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x);
+    return px + eye.project(moved(x, keyframe.tip_mm, p)) - eye.project(x) + row_offset;
   };
   CellWarp warp;
   warp.center_px = goes_to(cell.center_px);
@@ -69,7 +77,7 @@ CellWarp warp_of(const PatchCell& cell, const Eye& eye, const InstrumentKeyframe
 
 /// Share of the cells inside the outline that still lie on metal.
 double metal_share(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
-                   const ImageLayers& layers, const Vector6& p) {
+                   const ImageLayers& layers, const Unknowns& p) {
   int inside = 0, metal = 0;
   for (const PatchCell& cell : cells) {
     if (cell.outline) continue;
@@ -81,7 +89,7 @@ double metal_share(const std::vector<PatchCell>& cells, const Eye& eye, const In
 }
 
 void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
-             const ImageLayers& layers, int level, const Vector6& p, System& system) {
+             const ImageLayers& layers, int level, const Unknowns& p, System& system) {
   const double f = eye.rectification.focal_px;
   for (const PatchCell& cell : cells) {
     const Vec3 before = eye.point(keyframe.plane, cell.center_px, cell.height_px);
@@ -94,8 +102,8 @@ void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const Instrume
     const Vec3 arm = before - keyframe.tip_mm;
     Mat3 turning;  // d(omega x arm) / d omega
     turning << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
-    Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian << projection, projection * turning;
+    Eigen::Matrix<double, 2, kUnknowns> jacobian;
+    jacobian << projection, projection * turning, Eigen::Vector2d(0, eye.sees_row_offset() ? 1 : 0);
     system.normal += jacobian.transpose() * e.normal * jacobian;
     system.right += jacobian.transpose() * e.right;
     system.information += e.information;
@@ -112,18 +120,19 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
                                           const RigidMotion& guess) {
   if (left.region.area() == 0 || right.region.area() == 0) return {};
   const Eye left_eye{rectification, 0}, right_eye{rectification, rectification.baseline_mm};
-  Vector6 p;
-  p << guess.translation_mm, guess.rotation_rad;
-  Matrix6 prior = Matrix6::Zero();
-  prior.diagonal().tail<3>().setConstant(kCorrelatedNoise / std::pow(kRotationDeviation_rad, 2));
+  Unknowns p;
+  p << guess.translation_mm, guess.rotation_rad, 0;
+  Normal prior = Normal::Zero();
+  prior.diagonal().segment<3>(3).setConstant(kCorrelatedNoise / std::pow(kRotationDeviation_rad, 2));
+  prior(kUnknowns - 1, kUnknowns - 1) = kCorrelatedNoise / std::pow(kRowDeviation_px, 2);
   System system;
   for (int level = ImageLayers::kLevels - 1; level >= 0; --level)
     for (int pass = 0; pass < 8; ++pass) {
       system = System();
       add_eye(keyframe.left.cells[static_cast<size_t>(level)], left_eye, keyframe, left, level, p, system);
       add_eye(keyframe.right.cells[static_cast<size_t>(level)], right_eye, keyframe, right, level, p, system);
-      const Matrix6 normal = system.normal + prior + 1e-6 * Matrix6::Identity();
-      const Vector6 step = normal.ldlt().solve(system.right - prior * p);
+      const Normal normal = system.normal + prior + 1e-6 * Normal::Identity();
+      const Unknowns step = normal.ldlt().solve(system.right - prior * p);
       p += step;
       if (!p.allFinite()) return {};
       if (step.head<3>().norm() < 0.002) break;
@@ -134,7 +143,7 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
     return {};
   RigidMotion motion;
   motion.translation_mm = p.head<3>();
-  motion.rotation_rad = p.tail<3>();
+  motion.rotation_rad = p.segment<3>(3);
   motion.agreement = system.agreement();
   const double noise = std::max(0.1, system.squared_error / std::max(system.weight, 1.0));
   motion.covariance_mm2 = kCorrelatedNoise * noise * (system.normal + prior).inverse().topLeftCorner<3, 3>();
