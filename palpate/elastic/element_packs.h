@@ -8,9 +8,10 @@
 
 namespace palpate {
 
-/// Eight tetrahedra side by side.
+/// Eight tetrahedra of one tissue side by side.
 struct ElementPack {
   laws::Matrix3<Lanes> inverse_rest_edges;                    // D_m^-1
+  Lame lame;                                                  // of what each element does by itself
   Lanes rest_volume_mm3;                                      // 0 in the lanes beyond the last element
   std::array<std::array<int, Lanes::kCount>, 4> first_value;  // of each node in a vector of displacements
   std::array<int, Lanes::kCount> element;                     // number, -1 beyond the last element
@@ -22,9 +23,11 @@ struct ElementPacks {
   Phases phases;
 };
 
-/// `order`: the elements in phases; every range begins with a pack of its own.
-ElementPacks pack_elements(const Phases& order, const std::vector<Tetrahedron>& tetrahedra,
-                           const std::vector<Mat3>& inverse_rest_edges, const std::vector<double>& rest_volume_mm3);
+/// `order`: the elements in phases; every range begins with a pack of its own, and within it every tissue. `tissue`:
+/// number of each element's constants among `lame`.
+ElementPacks pack_elements(Phases order, const std::vector<Tetrahedron>& tetrahedra,
+                           const std::vector<Mat3>& inverse_rest_edges, const std::vector<double>& rest_volume_mm3,
+                           const std::vector<int>& tissue, const std::vector<Lame>& lame);
 
 /// F = D_s D_m^-1.
 inline laws::Matrix3<Lanes> deformation_gradient(const ElementPack& pack, const double* u) {

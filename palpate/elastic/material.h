@@ -11,12 +11,21 @@ namespace palpate {
 
 enum class Law { saint_venant_kirchhoff, neo_hookean, corotated, linear };
 
+/// Constants of one tissue among several; the law is the same for all.
+struct Stiffness {
+  double young_modulus_kPa = 0;
+  double poisson_ratio = 0.45;
+};
+
 /// gamma of the paper. Inside, stress is N/mm^2 = MPa.
 struct TissueOptions {
   Law law = Law::saint_venant_kirchhoff;
   double young_modulus_kPa = 0;
   double poisson_ratio = 0.45;
   std::string preset;  ///< liver, uterus, ...; fills the two numbers above where they are not given
+
+  /// Of the elements with label 1, 2, ...; elements with label 0, or with one that is not here, have the two above.
+  std::vector<Stiffness> of_label = {};
 
   double young_modulus_MPa() const { return young_modulus_kPa * 1e-3; }
 };
@@ -34,6 +43,8 @@ struct Lame {
   double mu = 0;
 };
 Lame lame_of(const TissueOptions& tissue);
+/// The one of elements with this label.
+Lame lame_of(const TissueOptions& tissue, int label);
 
 /// Strain energy per rest volume, N mm / mm^3.
 ///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E

@@ -9,11 +9,11 @@ constexpr double kKiloPascalPerMegaPascal = 1e3;
 }
 
 std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u) {
-  const Lame lame = lame_of(model.tissue());
   std::vector<double> stress(static_cast<size_t>(model.element_count()));
   for (int e = 0; e < model.element_count(); ++e)
     stress[static_cast<size_t>(e)] =
-        kKiloPascalPerMegaPascal * von_mises(cauchy_stress(model.tissue().law, lame, model.deformation_gradient(u, e)));
+        kKiloPascalPerMegaPascal *
+        von_mises(cauchy_stress(model.tissue().law, model.lame(e), model.deformation_gradient(u, e)));
   return stress;
 }
 

@@ -88,7 +88,7 @@ Eigen::VectorXd TetModel::star_pressure_MPa(const Eigen::VectorXd& u) const {
       const Star& star = stars_[static_cast<size_t>(star_phases_->order[static_cast<size_t>(s)])];
       double sum = 0;
       for (int e : star.elements) sum += growth_mm3[static_cast<size_t>(e)];
-      if (star.volume_mm3 > 0) pressure[star.node] = star_bulk_MPa_ / star.volume_mm3 * sum;
+      if (star.volume_mm3 > 0) pressure[star.node] = star.bulk_MPa / star.volume_mm3 * sum;
     }
   });
   return pressure;
@@ -100,7 +100,7 @@ double TetModel::energy(const Eigen::VectorXd& u) const {
     run_phases(packs_->phases, [&](int begin, int end) {
       for (int p = begin; p < end; ++p) {
         const ElementPack& pack = packs_->packs[static_cast<size_t>(p)];
-        const Lanes density = law.energy_density(lame_, palpate::deformation_gradient(pack, u.data()));
+        const Lanes density = law.energy_density(pack.lame, palpate::deformation_gradient(pack, u.data()));
         double sum = 0;
         for (int lane = 0; lane < Lanes::kCount; ++lane)
           if (pack.element[static_cast<size_t>(lane)] >= 0) sum += pack.rest_volume_mm3[lane] * density[lane];
@@ -113,7 +113,7 @@ double TetModel::energy(const Eigen::VectorXd& u) const {
   const Eigen::VectorXd pressure = star_pressure_MPa(u);
   for (size_t n = 0; n < stars_.size(); ++n) {
     const double p = pressure[static_cast<Eigen::Index>(n)];
-    total += stars_[n].volume_mm3 * p * p / (2 * star_bulk_MPa_);
+    if (stars_[n].bulk_MPa > 0) total += stars_[n].volume_mm3 * p * p / (2 * stars_[n].bulk_MPa);
   }
   return total;
 }
@@ -125,7 +125,7 @@ void TetModel::add_element_forces(const Eigen::VectorXd& u, const Eigen::VectorX
     for (int p = begin; p < end; ++p) {
       const ElementPack& pack = packs_->packs[static_cast<size_t>(p)];
       const Matrix3<Lanes> F = palpate::deformation_gradient(pack, u.data());
-      Matrix3<Lanes> P = L::first_piola_stress(lame_, F);
+      Matrix3<Lanes> P = L::first_piola_stress(pack.lame, F);
       if (!stars_.empty()) P += pressure_of(pack, pressure) * L::volume_ratio_gradient(F);
       // Columns: the forces on nodes 1 to 3; node 0 balances them.
       const Matrix3<Lanes> H = pack.rest_volume_mm3 * P * pack.inverse_rest_edges.transpose();
@@ -155,7 +155,7 @@ void TetModel::add_element_tangents(const Eigen::VectorXd& u, const Eigen::Vecto
     for (int p = begin; p < end; ++p) {
       const ElementPack& pack = packs_->packs[static_cast<size_t>(p)];
       const Matrix3<Lanes> F = palpate::deformation_gradient(pack, u.data());
-      Matrix9<Lanes> C = L::stress_derivative(lame_, F);
+      Matrix9<Lanes> C = L::stress_derivative(pack.lame, F);
       if (!stars_.empty()) C += pressure_of(pack, pressure) * L::volume_ratio_curvature(F);
       if (project) project_each(C);
       const Blocks blocks = stiffness_blocks(C, shape_gradients(pack), pack.rest_volume_mm3);
@@ -219,7 +219,7 @@ void TetModel::add_star_tangents(const Eigen::VectorXd& u, double* values) const
               of_element[static_cast<size_t>(e)].col(a);
       auto block = star.block_start.begin();
       for (auto column = star.free_nodes.begin(); column != star.free_nodes.end(); ++column) {
-        const Vec3 scaled = star_bulk_MPa_ / star.volume_mm3 * of_star[static_cast<size_t>(*column)];
+        const Vec3 scaled = star.bulk_MPa / star.volume_mm3 * of_star[static_cast<size_t>(*column)];
         for (auto row = column; row != star.free_nodes.end(); ++row)
           add_block(of_star[static_cast<size_t>(*row)], scaled, *row == *column, first_unknown(*column), *block++,
                     values);

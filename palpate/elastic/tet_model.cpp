@@ -33,7 +33,9 @@ std::vector<int> slabs_of_nodes(const std::vector<Vec3>& nodes, int slabs) {
 
 TetModel::TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::vector<int>& fixed_nodes,
                    Element element)
-    : rest_(mesh.nodes_mm), tetrahedra_(mesh.tetrahedra), tissue_(tissue), lame_(lame_of(tissue)) {
+    : rest_(mesh.nodes_mm), tetrahedra_(mesh.tetrahedra), tissue_(tissue), label_(mesh.tetrahedra.size(), 0) {
+  for (size_t e = 0; e < std::min(label_.size(), mesh.label.size()); ++e)
+    if (mesh.label[e] > 0 && mesh.label[e] <= static_cast<int>(tissue.of_label.size())) label_[e] = mesh.label[e];
   inverse_rest_edges_.reserve(tetrahedra_.size());
   rest_volume_mm3_.reserve(tetrahedra_.size());
   for (const Tetrahedron& t : tetrahedra_) {
@@ -58,15 +60,16 @@ TetModel::TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::
 }
 
 void TetModel::build_stars() {
-  star_bulk_MPa_ = bulk_modulus(lame_);
-  lame_ = without_bulk(lame_);
   stars_.resize(rest_.size());
   for (size_t e = 0; e < tetrahedra_.size(); ++e)
     for (int node : tetrahedra_[e]) stars_[static_cast<size_t>(node)].elements.push_back(static_cast<int>(e));
   for (Star& star : stars_) {
     star.node = static_cast<int>(&star - stars_.data());
     for (int e : star.elements) {
-      star.volume_mm3 += rest_volume_mm3_[static_cast<size_t>(e)] / 4;
+      const double quarter_mm3 = rest_volume_mm3_[static_cast<size_t>(e)] / 4;
+      star.bulk_MPa =
+          (star.volume_mm3 * star.bulk_MPa + quarter_mm3 * bulk_modulus(lame(e))) / (star.volume_mm3 + quarter_mm3);
+      star.volume_mm3 += quarter_mm3;
       for (int node : tetrahedra_[static_cast<size_t>(e)])
         if (!is_fixed(node)) star.free_nodes.push_back(node);
     }
@@ -145,8 +148,11 @@ void TetModel::build_order() {
     most.push_back(high);
   };
   for (const Tetrahedron& t : tetrahedra_) add_item(t);
-  packs_ = std::make_shared<ElementPacks>(
-      pack_elements(order_in_phases(least, most, slabs), tetrahedra_, inverse_rest_edges_, rest_volume_mm3_));
+  std::vector<Lame> of_label;
+  for (int label = 0; label <= static_cast<int>(tissue_.of_label.size()); ++label)
+    of_label.push_back(stars_.empty() ? lame_of(tissue_, label) : without_bulk(lame_of(tissue_, label)));
+  packs_ = std::make_shared<ElementPacks>(pack_elements(order_in_phases(least, most, slabs), tetrahedra_,
+                                                        inverse_rest_edges_, rest_volume_mm3_, label_, of_label));
   least.clear();
   most.clear();
   for (const Star& star : stars_) add_item(star.free_nodes);

@@ -36,6 +36,8 @@ class TetModel {
   const std::vector<Vec3>& rest_mm() const { return rest_; }
   const std::vector<Tetrahedron>& tetrahedra() const { return tetrahedra_; }
   const TissueOptions& tissue() const { return tissue_; }
+  /// Constants of one element, by its label.
+  Lame lame(int element) const { return lame_of(tissue_, label_[static_cast<size_t>(element)]); }
   double rest_volume_mm3(int element) const { return rest_volume_mm3_[static_cast<size_t>(element)]; }
 
   /// Deformation gradient F = D_s D_m^-1 of one element.
@@ -65,6 +67,7 @@ class TetModel {
   struct Star {
     int node = 0;
     double volume_mm3 = 0;
+    double bulk_MPa = 0;  // mean over the volume
     std::vector<int> elements;
     std::vector<int> free_nodes;   // ascending
     std::vector<int> block_start;  // for each pair of them, columns first: the first entry of their block in K
@@ -94,8 +97,7 @@ class TetModel {
   std::vector<Vec3> rest_;
   std::vector<Tetrahedron> tetrahedra_;
   TissueOptions tissue_;
-  Lame lame_;                             // of what each element does by itself
-  double star_bulk_MPa_ = 0;              // kappa of the stars
+  std::vector<int> label_;                // of each element, 0 to the number of labels that the tissue knows
   std::vector<Star> stars_;               // one per node; empty for Element::linear
   std::vector<Mat3> inverse_rest_edges_;  // D_m^-1
   std::vector<double> rest_volume_mm3_;

@@ -84,4 +84,13 @@ Lame lame_of(const TissueOptions& tissue) {
   return {E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))};
 }
 
+Lame lame_of(const TissueOptions& tissue, int label) {
+  if (label <= 0 || label > static_cast<int>(tissue.of_label.size())) return lame_of(tissue);
+  const Stiffness& stiffness = tissue.of_label[static_cast<size_t>(label) - 1];
+  TissueOptions labelled;
+  labelled.young_modulus_kPa = stiffness.young_modulus_kPa;
+  labelled.poisson_ratio = stiffness.poisson_ratio;
+  return lame_of(labelled);
+}
+
 }  // namespace palpate

@@ -1,13 +1,27 @@
 #include "palpate/estimate/scene.h"
 
+#include <Eigen/LU>
+
+#include "palpate/core/errors.h"
+
 namespace palpate {
 
 namespace {
 
 /// What the scene file will hold one day.
-const std::vector<std::string> kMapKeysNotYet = {"frames", "register", "focus_px", "focus", "labels"};
+const std::vector<std::string> kMapKeysNotYet = {"frames"};
 const std::vector<std::string> kInstrumentKeysNotYet = {"camera_from_robot", "time_offset_s", "[1]"};
 const std::vector<std::string> kSceneKeysNotYet = {"instruments", "instrument_2"};
+
+void check_map(const MapOptions& options) {
+  if (options.has_focus && !options.focus_px.empty())
+    throw BadInput("map has both focus and focus_px, expected one of them");
+  if (options.register_volume && options.volume.empty())
+    throw BadInput("map.register needs map.volume, the body that is to be registered");
+  const Mat3& R = options.register_from.left_from_volume;
+  if (!(R * R.transpose()).isIdentity(0.01) || R.determinant() < 0)
+    throw BadInput("map.register_from.rotation is no rotation");
+}
 
 }  // namespace
 
@@ -25,6 +39,32 @@ void describe(Settings& settings, MapOptions& options) {
   settings.choice<Element>(
       "element", options.element, {{"averaged", Element::averaged}, {"linear", Element::linear}},
       "averaged: the volume ratio averaged around each node, free of locking; linear: the paper's plain tetrahedra");
+  settings.flag("register", options.register_volume,
+                "move the volume, as a rigid body, to where the tissue was measured");
+  settings.group(
+      "register_from", "where the volume lies roughly: p_left = rotation p + translation; else equal middles are tried",
+      [&options](Settings& group) {
+        group.matrix3("rotation", options.register_from.left_from_volume, "row by row");
+        group.vector3("translation_mm", options.register_from.left_from_volume_mm, {-1e4, 1e4}, "left camera frame");
+      },
+      &options.has_register_from);
+  settings.number("register_limit_mm", options.register_limit_mm, {0, 100, true, false},
+                  "largest residual (root mean square) of the registration; beyond, the map is refused");
+  settings.polygon("focus_px", options.focus_px,
+                   "part of the left image as recorded where the elements are finer, in the same total number");
+  settings.group(
+      "focus", "or: a ball in which the elements are finer",
+      [&options](Settings& group) {
+        group.vector3("center_mm", options.focus_center_mm, {-1e4, 1e4}, "middle, left camera frame");
+        group.number("radius_mm", options.focus_radius_mm, {0, 1000, true, false}, "radius");
+        group.require("center_mm");
+        group.require("radius_mm");
+      },
+      &options.has_focus);
+  settings.number("focus_edge_ratio", options.focus_edge_ratio, {0.1, 1},
+                  "length of the edges there against that far away");
+  describe(settings, options.labels);
+  settings.after_reading([&options] { check_map(options); });
   describe(settings, options.match);
   describe(settings, options.surface);
   settings.not_yet(kMapKeysNotYet);

@@ -1,9 +1,12 @@
 #include "palpate/estimate/tissue_map.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/check_map.h"
 #include "palpate/instrument/segment.h"
@@ -32,6 +35,38 @@ double spacing_for(const PointCloud& cloud, const Rectification& rectification, 
   const double element_mm3 = area_mm2 * options.thickness_mm / options.elements;
   const double edge_mm = std::cbrt(6 * std::sqrt(2.0) * element_mm3);
   return std::clamp(edge_mm / 3, 0.6, 3.0);
+}
+
+/// Where the elements shall be finer; of a polygon, the tissue seen in it. Throws BadInput where there is none.
+std::optional<MeshFocus> focus_of(const MapOptions& options, const Surface& seen, const StereoRig& rig) {
+  if (options.has_focus) return MeshFocus{options.focus_center_mm, options.focus_radius_mm, options.focus_edge_ratio};
+  if (options.focus_px.empty()) return {};
+  constexpr double kRadius_mm = 3, kApart_mm = 2;
+  const std::vector<cv::Point2f> corners(options.focus_px.begin(), options.focus_px.end());
+  std::vector<Vec3> centers;
+  for (const Vec3& v : seen.vertices_mm)
+    if (cv::pointPolygonTest(corners, cv::Point2f(project_to_recorded_left(rig, v)), false) >= 0 &&
+        std::none_of(centers.begin(), centers.end(), [&](const Vec3& c) { return (c - v).norm() < kApart_mm; }))
+      centers.push_back(v);
+  if (centers.empty()) throw BadInput("map.focus_px: no tissue was measured in it, expected a part of the organ");
+  MeshFocus focus{centers.front(), kRadius_mm, options.focus_edge_ratio};
+  focus.also_around_mm.assign(centers.begin() + 1, centers.end());
+  return focus;
+}
+
+/// Moves the body where the camera sees it. Throws BadInput where it fits worse than the options allow.
+Registration register_to(const PointCloud& seen, const MapOptions& options, Surface& body) {
+  constexpr double kLeastShare = 0.6;
+  const Registration found = register_body(
+      body, seen.position_mm, options.has_register_from ? std::optional(options.register_from) : std::nullopt);
+  if (found.residual_mm > options.register_limit_mm || found.matched_share < kLeastShare)
+    throw BadInput(fmt::format(
+        "map.register: {} fits the measured tissue to {:.2f} mm over {:.0f} % of it, expected at most {:g} mm over at "
+        "least {:.0f} % (is it this organ? say roughly where it lies by register_from)",
+        options.volume.string(), found.residual_mm, 100 * found.matched_share, options.register_limit_mm,
+        100 * kLeastShare));
+  for (Vec3& v : body.vertices_mm) v = found.apply(v);
+  return found;
 }
 
 double median_of(std::vector<float> values) {
@@ -68,16 +103,24 @@ TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectif
   map.surface = cocone(points.position_mm, options.surface);
   map.report.surface_ms = watch.lap_ms();
 
-  const Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
-                                              : read_body(options.volume, options.volume_unit);
+  Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
+                                        : read_body(options.volume, options.volume_unit);
+  if (options.register_volume) {
+    map.report.registration = register_to(points, options, body);
+    map.report.register_ms = watch.lap_ms();
+  }
   if (!options.volume.empty())
     require_body_where_seen(body, map.disparity, rectification, map.organ_mask, options.volume);
-  map.mesh = tetrahedralize(body, options.elements, {}, &map.report.mesh);
+  map.mesh =
+      tetrahedralize(body, options.elements, focus_of(options, map.surface, rectification.rig), &map.report.mesh);
   map.report.volume_ms = watch.lap_ms();
 
-  map.fixed_nodes = select_attachments(map.mesh, attachments, [&rectification](const Vec3& point) {
+  const auto project_px = [&rectification](const Vec3& point) {
     return project_to_recorded_left(rectification.rig, point);
-  });
+  };
+  assign_labels(map.mesh, options.labels, frame.left.size(), project_px);
+  for (const TissueLabel& label : options.labels) map.tissue.of_label.push_back(label.tissue);
+  map.fixed_nodes = select_attachments(map.mesh, attachments, project_px);
   require_every_piece_held(map.mesh, map.fixed_nodes);
   map.report.attachments_ms = watch.lap_ms();
 

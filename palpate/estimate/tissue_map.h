@@ -7,11 +7,13 @@
 #include "palpate/core/settings.h"
 #include "palpate/elastic/material.h"
 #include "palpate/elastic/tet_model.h"
+#include "palpate/estimate/tissue_labels.h"
 #include "palpate/stereo/match.h"
 #include "palpate/stereo/rig.h"
 #include "palpate/surface/clean_points.h"
 #include "palpate/volume/attachments.h"
 #include "palpate/volume/body.h"
+#include "palpate/volume/register_body.h"
 #include "palpate/volume/tetrahedralize.h"
 
 namespace palpate {
@@ -24,6 +26,16 @@ struct MapOptions {
   double thickness_mm = 25;
   std::filesystem::path volume;
   LengthUnit volume_unit = LengthUnit::mm;
+  bool register_volume = false;
+  bool has_register_from = false;
+  Registration register_from;      ///< where the operator says that the volume lies
+  double register_limit_mm = 1.5;  ///< largest residual
+  std::vector<cv::Point2d> focus_px;
+  bool has_focus = false;
+  Vec3 focus_center_mm = Vec3::Zero();
+  double focus_radius_mm = 0;
+  double focus_edge_ratio = 0.4;
+  std::vector<TissueLabel> labels;
   Element element = Element::averaged;
   MatchOptions match;
   SurfaceOptions surface;
@@ -33,12 +45,13 @@ void describe(Settings& settings, MapOptions& options);
 
 /// What the build stage took and left, for map.json.
 struct MapReport {
-  double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, clean_ms = 0, surface_ms = 0, volume_ms = 0,
+  double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, clean_ms = 0, surface_ms = 0, register_ms = 0, volume_ms = 0,
          attachments_ms = 0;
   int matched_points = 0;
   double coverage = 0;  ///< share of the organ region with a measured disparity
   double median_depth_deviation_mm = 0;
   MeshReport mesh;
+  std::optional<Registration> registration;
 };
 
 /// V of Eq. 1 and everything seen on the way to it.

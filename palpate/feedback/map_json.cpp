@@ -1,5 +1,6 @@
 #include "palpate/feedback/map_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,25 @@ std::string map_json(const TissueMap& map, const Rectification& rectification) {
   json["median_depth_deviation_mm"] = r.median_depth_deviation_mm;
   json["smallest_dihedral_deg"] = r.mesh.smallest_dihedral_deg;
   json["cell_size_mm"] = r.mesh.cell_size_mm;
+  if (r.registration) {
+    nlohmann::ordered_json rotation;
+    for (int i = 0; i < 3; ++i) {
+      const auto row = r.registration->left_from_volume.row(i);
+      rotation.push_back({row[0], row[1], row[2]});
+    }
+    const Vec3& t = r.registration->left_from_volume_mm;
+    json["registration"] = {{"residual_mm", r.registration->residual_mm},
+                            {"matched_share", r.registration->matched_share},
+                            {"left_from_volume", rotation},
+                            {"left_from_volume_mm", {t.x(), t.y(), t.z()}}};
+    json["times_ms"]["register"] = r.register_ms;
+  }
+  for (size_t k = 0; k < map.tissue.of_label.size(); ++k)
+    json["labels"].push_back(
+        {{"label", k + 1},
+         {"elements", std::count(map.mesh.label.begin(), map.mesh.label.end(), static_cast<int>(k) + 1)},
+         {"young_modulus_kPa", map.tissue.of_label[k].young_modulus_kPa},
+         {"poisson_ratio", map.tissue.of_label[k].poisson_ratio}});
   json["tissue"] = {{"law", law_name(map.tissue.law)},
                     {"young_modulus_kPa", map.tissue.young_modulus_kPa},
                     {"poisson_ratio", map.tissue.poisson_ratio}};

@@ -45,8 +45,11 @@ struct SizeField {
 
   FT operator()(const Point_3& p, int, const Index&) const {
     if (!focus) return size_mm;
-    const double beyond = (Vec3(p.x(), p.y(), p.z()) - focus->center_mm).norm() - focus->radius_mm;
-    return std::min(size_mm, focus->edge_ratio * size_mm + std::max(0.0, beyond) / 3);
+    const Vec3 here(p.x(), p.y(), p.z());
+    double squared = (here - focus->center_mm).squaredNorm();
+    for (const Vec3& center : focus->also_around_mm) squared = std::min(squared, (here - center).squaredNorm());
+    const double beyond = std::max(0.0, std::sqrt(squared) - focus->radius_mm);
+    return std::min(size_mm, focus->edge_ratio * size_mm + beyond / 3);
   }
 };
 

@@ -11,6 +11,7 @@ struct MeshFocus {
   Vec3 center_mm = Vec3::Zero();
   double radius_mm = 0;
   double edge_ratio = 0.5;
+  std::vector<Vec3> also_around_mm = {};  ///< middles of further balls of the same radius
 };
 
 struct MeshReport {

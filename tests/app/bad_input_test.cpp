@@ -151,8 +151,7 @@ TEST_F(BadInput, TheStageThatFailsIsToldWithTheSceneFile) {
 
 TEST_F(BadInput, AKeyOfTheDesignThatIsNotThereYetIsToldAsSuch) {
   const std::string good = read_file(in("scene.yaml"));
-  for (const char* key : {"frames: [0, 9]", "register: true", "focus_px: [[1, 1], [2, 1], [2, 2]]",
-                          "focus: {radius_mm: 3}", "labels: {liver: {}}", "matcher: net.onnx"}) {
+  for (const char* key : {"frames: [0, 9]", "matcher: net.onnx"}) {
     write_file(in("scene.yaml"), good);
     spoil_scene("thickness_mm: 15", std::string("thickness_mm: 15, ") + key);
     EXPECT_THAT(complaint(), AllOf(HasSubstr("scene.yaml:2: map."), HasSubstr("not available yet"))) << key;
@@ -165,6 +164,47 @@ TEST_F(BadInput, AKeyOfTheDesignThatIsNotThereYetIsToldAsSuch) {
   write_file(in("scene.yaml"), good);
   spoil_scene("{segmentation: colour}", "[{segmentation: colour}, {segmentation: colour}]");
   EXPECT_THAT(complaint(), HasSubstr("instrument[1] is not available yet"));
+}
+
+TEST_F(BadInput, AnOrganRegionWithNothingToMatchIsNoticed) {
+  spoil_scene("[[40, 30], [300, 30], [300, 210], [40, 210]]", "[[40, 30], [44, 30], [44, 34], [40, 34]]");
+  EXPECT_THAT(complaint(), HasSubstr("scene.yaml: map"));
+}
+
+TEST_F(BadInput, ACoveredEyeIsNoticed) {
+  const cv::Mat black(240, 320, CV_8UC3, cv::Scalar::all(2));
+  write_avi(in("right.avi"), {black, black, black});
+  EXPECT_THAT(complaint(), HasSubstr("scene.yaml: map"));
+}
+
+TEST_F(BadInput, ABrokenVolumeFileIsNamed) {
+  write_file(in("organ.msh"), "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n7\n1 0 0");
+  spoil_scene("thickness_mm: 15", "volume: organ.msh");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("map.volume"), HasSubstr("organ.msh")));
+}
+
+TEST_F(BadInput, ALabelOutsideTheOrganIsNamed) {
+  spoil_scene("thickness_mm: 15",
+              "thickness_mm: 15, labels: [{name: tumour, region_px: [[1, 1], [9, 1], [9, 9]], tissue: "
+              "{young_modulus_kPa: 80}}]");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("map.labels"), HasSubstr("'tumour'")));
+}
+
+TEST_F(BadInput, AMaskOfAnotherSizeIsNamed) {
+  cv::imwrite(in("mask.png").string(), cv::Mat(100, 100, CV_8U, cv::Scalar(255)));
+  spoil_scene("thickness_mm: 15",
+              "thickness_mm: 15, labels: [{name: tumour, mask: mask.png, tissue: {young_modulus_kPa: 80}}]");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("mask.png"), HasSubstr("100x100"), HasSubstr("320x240")));
+}
+
+TEST_F(BadInput, AFocusOutsideTheOrganIsNamed) {
+  spoil_scene("thickness_mm: 15", "thickness_mm: 15, focus_px: [[1, 1], [9, 1], [9, 9]]");
+  EXPECT_THAT(complaint(), HasSubstr("map.focus_px"));
+}
+
+TEST_F(BadInput, RegisteringWithoutAVolumeIsRefused) {
+  spoil_scene("thickness_mm: 15", "thickness_mm: 15, register: true");
+  EXPECT_THAT(complaint(), HasSubstr("map.register needs map.volume"));
 }
 
 TEST_F(BadInput, AMissingTipTrackIsNoticedBeforeTheMapIsBuilt) {

@@ -193,6 +193,63 @@ TEST(TetModel, ProjectedTangentsArePositiveSemiDefiniteWhereThePlainOnesAreNot) 
   EXPECT_GT(smallest(projected), -1e-12);
 }
 
+/// Force that pulls the upper end of a held block of 10 mm up by 0.05 mm.
+double pull_N(const TetMesh& mesh, const TissueOptions& tissue, Element element) {
+  std::map<int, Vec3> imposed;
+  for (int node : test::nodes_at(mesh, 2, 0)) imposed[node] = Vec3::Zero();
+  for (int node : test::nodes_at(mesh, 2, 10)) imposed[node] = {0, 0, 0.05};
+  const TetModel model(mesh, tissue, test::nodes_of(imposed), element);
+  const test::PrescribedEquilibrium found = test::solve_prescribed(model, imposed);
+  EXPECT_TRUE(found.converged);
+  double sum = 0;
+  for (int node : test::nodes_at(mesh, 2, 10)) sum += found.force[3 * node + 2];
+  return sum;
+}
+
+TEST(TetModel, LabelsGiveElementsAStiffnessOfTheirOwn) {
+  TetMesh mesh = test::box_mesh({4, 4, 10}, {2, 2, 6});
+  TissueOptions tissue{Law::saint_venant_kirchhoff, 10, 0, ""};
+  for (Element element : {Element::linear, Element::averaged}) {
+    mesh.label.assign(mesh.tetrahedra.size(), 0);
+    tissue.of_label.clear();
+    const double soft_N = pull_N(mesh, tissue, element);
+    // All of it labelled: another E for the whole body.
+    tissue.of_label = {{40, 0}};
+    mesh.label.assign(mesh.tetrahedra.size(), 1);
+    EXPECT_NEAR(pull_N(mesh, tissue, element) / soft_N, 4, 1e-9);
+    // Layers in series, nu = 0: compliances add up, 2 / (1 + 1/4) = 1.6 times the soft one.
+    for (size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
+      double z = 0;
+      for (int node : mesh.tetrahedra[e]) z += mesh.nodes_mm[static_cast<size_t>(node)].z() / 4;
+      mesh.label[e] = z > 5;
+    }
+    EXPECT_NEAR(pull_N(mesh, tissue, element) / soft_N, 1.6, element == Element::linear ? 0.01 : 0.1);
+    // A label that the tissue does not know is the first tissue.
+    mesh.label.assign(mesh.tetrahedra.size(), 7);
+    EXPECT_NEAR(pull_N(mesh, tissue, element) / soft_N, 1, 1e-12);
+  }
+}
+
+TEST(TetModel, LabelledTissueStillHasForcesThatAreTheGradientOfItsEnergyAndATangentThatIsTheirs) {
+  TetMesh mesh = test::box_mesh({4, 4, 10}, {2, 2, 3});
+  for (size_t e = 0; e < mesh.tetrahedra.size(); ++e) mesh.label[e] = static_cast<int>(e % 3);
+  TissueOptions tissue{Law::neo_hookean, 10, 0.45, ""};
+  tissue.of_label = {{80, 0.3}, {3, 0.48}};
+  const TetModel model(mesh, tissue, test::nodes_at(mesh, 2, 0), Element::averaged);
+  Eigen::VectorXd u(3 * model.node_count()), direction(u.size());
+  for (Eigen::Index i = 0; i < u.size(); ++i) u[i] = 0.1 * std::sin(3.0 * i), direction[i] = std::cos(5.0 * i);
+  direction = model.expand(model.reduce(direction));
+  const double h = 1e-5;
+  const double slope = (model.energy(u + h * direction) - model.energy(u - h * direction)) / (2 * h);
+  EXPECT_NEAR(model.internal_force(u).dot(direction) / slope, 1, 1e-6);
+  Eigen::SparseMatrix<double> K;
+  model.tangent(u, false, K);
+  const Eigen::VectorXd change =
+      (model.internal_force(u + h * direction) - model.internal_force(u - h * direction)) / (2 * h);
+  const Eigen::VectorXd by_tangent = K.selfadjointView<Eigen::Lower>() * model.reduce(direction);
+  EXPECT_LT((model.reduce(change) - by_tangent).norm(), 1e-5 * by_tangent.norm());
+}
+
 TEST(SparseFactor, SolvesAndNoticesAnIndefiniteMatrix) {
   const TetMesh mesh = test::box_mesh({10, 10, 10}, {3, 3, 3});
   const TetModel model(mesh, tissue_of(Law::neo_hookean), test::nodes_at(mesh, 2, 0));
