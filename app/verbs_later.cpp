@@ -5,7 +5,7 @@
 namespace palpate::app {
 
 void add_later_verbs(CLI::App& app) {
-  for (const char* name : {"study", "console"}) {
+  for (const char* name : {"console"}) {
     CLI::App* verb = app.add_subcommand(name, "not there yet");
     verb->allow_extras();
     verb->footer(fmt::format("Example: palpate {} is not there yet", name));

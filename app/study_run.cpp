@@ -1,0 +1,115 @@
+#include "app/study_run.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+
+#include "app/run.h"
+#include "app/simulation.h"
+#include "palpate/core/errors.h"
+
+namespace palpate::app {
+
+namespace {
+
+constexpr const char* kDoneFile = "done";
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream stream(file);
+  stream << text;
+  if (!stream.flush()) throw Unfinished(file.string() + ": cannot be written");
+}
+
+/// Relative paths of a scene start at its file; a copy elsewhere has to say them in full.
+void make_paths_absolute(YAML::Node scene, const std::filesystem::path& from) {
+  const auto full = [&from](YAML::Node group, const char* key) {
+    if (!group.IsMap() || !group[key] || !group[key].IsScalar()) return;
+    const auto text = group[key].as<std::string>();
+    if (text.find("${") == std::string::npos && text.find("://") == std::string::npos &&
+        std::filesystem::path(text).is_relative() && std::filesystem::exists(from / text))
+      group[key] = std::filesystem::absolute(from / text).string();
+  };
+  for (const char* key : {"left", "right", "stereo", "calibration"}) full(scene["recording"], key);
+  full(scene["map"], "volume");
+  full(scene["instrument"], "track");
+}
+
+YAML::Node merged(const YAML::Node& base, const YAML::Node& told) {
+  if (!base.IsMap() || !told.IsMap()) return YAML::Clone(told);
+  YAML::Node result = YAML::Clone(base);
+  for (const auto& entry : told) {
+    const auto key = entry.first.as<std::string>();
+    result[key] = result[key] ? merged(YAML::Clone(result[key]), entry.second) : YAML::Clone(entry.second);
+  }
+  return result;
+}
+
+/// What a run is told, to be recognised by.
+std::string told_text(const StudyRun& run) {
+  return YAML::Dump(run.scene) + "\n# sequence " + run.sequence + "\n";
+}
+
+}  // namespace
+
+std::filesystem::path sequence_folder(const std::string& sequence, const std::filesystem::path& folder) {
+  return folder / "sequences" / sequence;
+}
+
+std::filesystem::path run_folder(const StudyRun& run, const std::filesystem::path& folder) {
+  return folder / "runs" / run.name;
+}
+
+bool sequence_is_there(const StudySequence& sequence, const std::filesystem::path& folder) {
+  return std::filesystem::exists(sequence_folder(sequence.name, folder) / kDoneFile);
+}
+
+void make_sequence(const StudySequence& sequence, const Study& study, const std::filesystem::path& folder) {
+  if (sequence_is_there(sequence, folder)) return;
+  const std::filesystem::path place = sequence_folder(sequence.name, folder);
+  std::filesystem::create_directories(place);
+  YAML::Node scene = YAML::Clone(sequence.scene);
+  YAML::Node body = scene["simulate"]["body"];
+  if (body.IsMap() && body["shape"] &&
+      std::filesystem::exists(study.file.parent_path() / body["shape"].as<std::string>()))
+    body["shape"] = std::filesystem::absolute(study.file.parent_path() / body["shape"].as<std::string>()).string();
+  write_text(place / "simulate.yaml", YAML::Dump(scene) + "\n");
+  DejaVuSummary summary;
+  simulate_into(read_scene_file(place / "simulate.yaml", false), place, true, summary);
+  write_text(place / kDoneFile, "");
+}
+
+void make_run(const StudyRun& run, const std::filesystem::path& folder) {
+  const std::filesystem::path place = run_folder(run, folder);
+  std::filesystem::create_directories(place);
+  YAML::Node scene = YAML::Clone(run.scene);
+  std::filesystem::path truth;
+  if (run.sequence.empty()) {
+    make_paths_absolute(scene, run.experiment->scene.parent_path());
+  } else {
+    const std::filesystem::path sequence = sequence_folder(run.sequence, folder);
+    YAML::Node base = YAML::LoadFile((sequence / "scene.yaml").string());
+    scene = merged(base, scene);
+    make_paths_absolute(scene, sequence);
+    truth = sequence / "truth.csv";
+  }
+  write_text(place / "scene.yaml", YAML::Dump(scene) + "\n");
+  nlohmann::ordered_json result;
+  try {
+    result = to_json(run_estimate(read_scene_file(place / "scene.yaml", true), {place, truth, true}));
+    result["status"] = "done";
+  } catch (const BadInput& error) {
+    result = {{"status", "failed"}, {"reason", error.what()}};
+  }
+  result["told"] = told_text(run);
+  write_text(place / "result.json", result.dump(2) + "\n");
+}
+
+nlohmann::ordered_json result_of(const StudyRun& run, const std::filesystem::path& folder) {
+  std::ifstream stream(run_folder(run, folder) / "result.json");
+  if (!stream) return nullptr;
+  auto result = nlohmann::ordered_json::parse(stream, nullptr, false);
+  if (result.is_discarded() || result.value("told", "") != told_text(run)) return nullptr;
+  return result;
+}
+
+}  // namespace palpate::app
