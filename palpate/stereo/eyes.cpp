@@ -18,52 +18,59 @@ constexpr double kLeastRowOffset_px = 0.02;
 constexpr int kHalo_px = 5;  // highlights shine into their neighbourhood
 
 // Black that touches the rim of the image.
-cv::Mat black_border(const cv::Mat& bgr) {
-  cv::Mat brightest;
-  cv::Mat channels[3];
-  cv::split(bgr, channels);
-  cv::max(channels[0], channels[1], brightest);
-  cv::max(brightest, channels[2], brightest);
+cv::Mat black_border(const cv::Mat& brightest) {
   cv::Mat framed;
   cv::copyMakeBorder(brightest <= kBlack, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   cv::floodFill(framed, {0, 0}, cv::Scalar(128));
-  return framed(cv::Rect({1, 1}, bgr.size())) == 128;
+  return framed(cv::Rect({1, 1}, brightest.size())) == 128;
+}
+
+// Of a whole image: what both eyes can see alike, and the black border.
+struct Areas {
+  cv::Mat matchable, border;
+};
+
+Areas areas_of(const cv::Mat& bgr) {
+  cv::Mat channels[3], darkest, brightest;
+  cv::split(bgr, channels);
+  cv::min(channels[0], channels[1], darkest);
+  cv::min(darkest, channels[2], darkest);
+  cv::max(channels[0], channels[1], brightest);
+  cv::max(brightest, channels[2], brightest);
+  // Soft reflections do not saturate, but outshine their surroundings in every channel.
+  cv::Mat surroundings;
+  cv::blur(darkest, surroundings, {kSurroundings_px, kSurroundings_px});
+  const cv::Mat blocked = (darkest >= kSaturated) | ((darkest - kOutshine) > surroundings);
+  Areas areas;
+  areas.border = black_border(brightest);
+  const cv::Mat halo = cv::getStructuringElement(cv::MORPH_ELLIPSE, {kHalo_px, kHalo_px});
+  cv::dilate(blocked | areas.border, areas.matchable, halo);
+  cv::bitwise_not(areas.matchable, areas.matchable);
+  return areas;
 }
 
 }  // namespace
 
 cv::Mat matchable_mask(const cv::Mat& bgr) {
-  cv::Mat channels[3];
-  cv::split(bgr, channels);
-  cv::Mat darkest;
-  cv::min(channels[0], channels[1], darkest);
-  cv::min(darkest, channels[2], darkest);
-  // Soft reflections do not saturate, but outshine their surroundings in every channel.
-  cv::Mat surroundings;
-  cv::blur(darkest, surroundings, {kSurroundings_px, kSurroundings_px});
-  cv::Mat blocked = (darkest >= kSaturated) | ((darkest - kOutshine) > surroundings);
-  const cv::Mat halo = cv::getStructuringElement(cv::MORPH_ELLIPSE, {kHalo_px, kHalo_px});
-  cv::dilate(blocked, blocked, halo);
-  cv::Mat border = black_border(bgr);
-  cv::dilate(border, border, halo);
-  return ~(blocked | border);
+  return areas_of(bgr).matchable;
 }
 
 Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask) {
   struct Eye {
-    cv::Mat grey, matchable;
+    cv::Mat grey;
+    Areas areas;
     cv::Scalar mean, deviation;
   } left, right;
   const auto look = [](const cv::Mat& bgr, Eye& eye) {
-    eye.matchable = matchable_mask(bgr);
+    eye.areas = areas_of(bgr);
     cv::cvtColor(bgr, eye.grey, cv::COLOR_BGR2GRAY);
-    cv::meanStdDev(eye.grey, eye.mean, eye.deviation, eye.matchable);
+    cv::meanStdDev(eye.grey, eye.mean, eye.deviation, eye.areas.matchable);
   };
   tbb::parallel_invoke([&] { look(left_bgr, left); }, [&] { look(right_bgr, right); });
   Eyes eyes;
-  eyes.left_mask = left.matchable & mask;
-  eyes.wanted = mask & ~black_border(left_bgr);
-  eyes.right_mask = right.matchable;
+  eyes.left_mask = left.areas.matchable & mask;
+  eyes.wanted = mask & ~left.areas.border;
+  eyes.right_mask = right.areas.matchable;
   const double gain = right.deviation[0] > 1 ? left.deviation[0] / right.deviation[0] : 1;
   left.grey.convertTo(eyes.left, CV_32F);
   right.grey.convertTo(eyes.right, CV_32F, gain, left.mean[0] - gain * right.mean[0]);

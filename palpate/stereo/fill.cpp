@@ -9,29 +9,42 @@
 namespace palpate {
 namespace {
 
+constexpr float kNoise = 25 * 2 * 3 * 3;  // of a comparison with three grey levels of noise in each eye
+constexpr float kMostDifference = 0.6f;   // of two windows, of what the left one shows
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
-// Difference of two small windows without their means, grey levels; large where the right one leaves the image.
-float window_difference(const Eyes& eyes, cv::Point at, float disparity) {
-  constexpr int r = 2;
+// Two small windows compared.
+struct Comparison {
+  bool possible = false;  // both windows lie in their images
+  float difference = 0;   // sum of squares without the means, grey levels
+  float texture = 0;      // likewise of the left window alone
+};
+
+// 5 x 5, two rows at a time.
+Comparison compare(const Eyes& eyes, cv::Point at, float disparity) {
+  constexpr int r = 2, pixels = (2 * r + 1) * (2 * r + 1);
+  constexpr FloatLanes kBoth = {1, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0};
+  constexpr FloatLanes kFirst = {1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   const float x = static_cast<float>(at.x) - disparity;
   const int whole = cvFloor(x);
-  if (whole < r || whole + r + 1 >= eyes.right.cols || at.x < r || at.x + r >= eyes.left.cols || at.y < r ||
+  if (whole < r || whole + 7 >= eyes.right.cols || at.x < r || at.x + 6 >= eyes.left.cols || at.y < r ||
       at.y + r >= eyes.left.rows)
-    return std::numeric_limits<float>::max();
-  const float t = x - static_cast<float>(whole);
-  float sum = 0, squares = 0;
-  for (int v = -r; v <= r; ++v) {
-    const float* a = eyes.left.ptr<float>(at.y + v) + at.x;
-    const float* b = eyes.right.ptr<float>(at.y + v) + whole;
-    for (int u = -r; u <= r; ++u) {
-      const float difference = a[u] - b[u] - t * (b[u + 1] - b[u]);
-      sum += difference;
-      squares += difference * difference;
-    }
+    return {};
+  const float t = x - static_cast<float>(whole), middle = eyes.left.at<float>(at);
+  FloatLanes sum = {}, squares = {}, left_sum = {}, left_squares = {};
+  for (int v = -r; v <= r; v += 2) {
+    const int next = std::min(v + 1, r);
+    const FloatLanes& weight = v < r ? kBoth : kFirst;
+    const float *a = eyes.left.ptr<float>(at.y + v) + at.x - r, *b = eyes.left.ptr<float>(at.y + next) + at.x - r;
+    const float *c = eyes.right.ptr<float>(at.y + v) + whole - r, *d = eyes.right.ptr<float>(at.y + next) + whole - r;
+    const FloatLanes left = (load_halves(a, b) - middle) * weight;
+    const FloatLanes right = (1 - t) * load_halves(c, d) + t * load_halves(c + 1, d + 1) - middle;
+    const FloatLanes difference = left - right * weight;
+    sum += difference, squares += difference * difference;
+    left_sum += left, left_squares += left * left;
   }
-  constexpr float n = (2 * r + 1) * (2 * r + 1);
-  return squares - 0.5f * sum * sum / n;
+  const float mean = total(sum), left_mean = total(left_sum);
+  return {true, total(squares) - mean * mean / pixels, total(left_squares) - left_mean * left_mean / pixels};
 }
 
 // What the four cells at the corners of a square say about its 4 x 4 pixels, row by row; NaN where they say nothing.
@@ -75,44 +88,76 @@ struct PixelGuess {
   float correlation = 0;
 };
 
+// The cells around the square between four of them.
+struct Surroundings {
+  struct Surface {
+    const Cell* cell;
+    float u, v;    // of the square's first pixel from the cell, px
+    float middle;  // disparity in the middle of the square
+  };
+  Surface surfaces[kLanes];  // that differ in the middle of the square
+  int count = 0;
+  bool contested = false;  // they disagree by more than a pixel
+  bool ragged = false;     // some cells are missing
+};
+
+Surroundings surroundings(const CellGrid& grid, int column, int row) {
+  constexpr float kDiffer_px = 0.5f;
+  float least = std::numeric_limits<float>::max(), most = -least;
+  Surroundings result;
+  for (int j = -1; j <= 2; ++j)
+    for (int i = -1; i <= 2; ++i) {
+      if (!grid.holds(column + i, row + j)) continue;
+      const Cell& cell = grid.at(column + i, row + j);
+      if (!cell.matched) {
+        result.ragged = true;
+        continue;
+      }
+      const float u = static_cast<float>(-kStep * i), v = static_cast<float>(-kStep * j);
+      const float middle = cell.plane.at(u + 0.5f * kStep, v + 0.5f * kStep);
+      least = std::min(least, middle);
+      most = std::max(most, middle);
+      const auto like = [middle](const Surroundings::Surface& s) { return std::abs(s.middle - middle) < kDiffer_px; };
+      if (std::none_of(result.surfaces, result.surfaces + result.count, like))
+        result.surfaces[result.count++] = {&cell, u, v, middle};
+    }
+  result.contested = most - least > 1;
+  return result;
+}
+
 // Large windows carry the disparity of one surface a few pixels over the edge of the next. Near a step of depth, the
-// surfaces around compete for the pixel in a small window.
-PixelGuess compete(const Eyes& eyes, const CellGrid& grid, cv::Point at, const PixelGuess& before) {
+// surfaces around compete for the pixel (i, j) of the square, that stands at `at`, in a small window.
+PixelGuess compete(const Eyes& eyes, const Surroundings& around, cv::Point in_square, cv::Point at,
+                   const PixelGuess& before) {
   constexpr float kClearlyBetter = 0.7f;
   PixelGuess best = before;
-  float least = -1;
-  float tried[kLanes];
-  int tries = 0;
-  for (int row = at.y / kStep - 1; row <= at.y / kStep + 2; ++row)
-    for (int column = at.x / kStep - 1; column <= at.x / kStep + 2; ++column) {
-      if (!grid.holds(column, row) || !grid.at(column, row).matched) continue;
-      const Cell& cell = grid.at(column, row);
-      const float value =
-          cell.plane.at(static_cast<float>(at.x - column * kStep), static_cast<float>(at.y - row * kStep));
-      if (std::abs(value - before.disparity) < 1) continue;
-      if (std::any_of(tried, tried + tries, [value](float t) { return std::abs(value - t) < 0.3f; })) continue;
-      tried[tries++] = value;
-      if (least < 0) least = kClearlyBetter * window_difference(eyes, at, before.disparity);
-      const float difference = window_difference(eyes, at, value);
-      if (difference >= least) continue;
-      least = difference;
-      best = {value, cell.information, cell.correlation};
+  float least = 0;
+  bool compared = false;
+  for (int k = 0; k < around.count; ++k) {
+    const Surroundings::Surface& surface = around.surfaces[k];
+    const Cell& cell = *surface.cell;
+    const float value =
+        cell.plane.at(surface.u + static_cast<float>(in_square.x), surface.v + static_cast<float>(in_square.y));
+    if (std::abs(value - before.disparity) < 1) continue;
+    if (!compared) {
+      compared = true;
+      const Comparison comparison = compare(eyes, at, before.disparity);
+      if (!comparison.possible) return before;
+      least = kClearlyBetter * comparison.difference - kNoise / 6;
     }
+    const Comparison comparison = compare(eyes, at, value);
+    if (!comparison.possible || comparison.difference >= least) continue;
+    least = comparison.difference;
+    best = {value, cell.information, cell.correlation};
+  }
   return best;
 }
 
-// Whether cells around the square between four cells disagree about it.
-bool contested(const CellGrid& grid, int column, int row) {
-  float least = std::numeric_limits<float>::max(), most = -least;
-  for (int j = -1; j <= 2; ++j)
-    for (int i = -1; i <= 2; ++i) {
-      if (!grid.holds(column + i, row + j) || !grid.at(column + i, row + j).matched) continue;
-      const float value = grid.at(column + i, row + j)
-                              .plane.at(kStep * (0.5f - static_cast<float>(i)), kStep * (0.5f - static_cast<float>(j)));
-      least = std::min(least, value);
-      most = std::max(most, value);
-    }
-  return most - least > 1;
+// At an edge, what is hidden from the other eye would take the disparity of its neighbours: there the windows differ
+// by more than the left one shows.
+bool confirmed(const Eyes& eyes, cv::Point at, float disparity) {
+  const Comparison comparison = compare(eyes, at, disparity);
+  return !comparison.possible || comparison.difference < kMostDifference * comparison.texture + kNoise;
 }
 
 }  // namespace
@@ -139,13 +184,16 @@ DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
   tbb::parallel_for(0, grid.rows, [&](int row) {
     for (int column = 0; column < grid.columns; ++column) {
       const Square square = blend(grid, column, row);
-      const bool competition = contested(grid, column, row);
+      const Surroundings around = surroundings(grid, column, row);
       for (int i = 0; i < kLanes; ++i) {
         const int x = column * kStep + i % kStep, y = row * kStep + i / kStep;
         if (x >= size.width || y >= size.height || !eyes.wanted.at<uchar>(y, x)) continue;
         PixelGuess guess{square.disparity[i], square.information[i], square.correlation[i]};
         if (std::isnan(guess.disparity)) continue;
-        if (competition) guess = compete(eyes, grid, {x, y}, guess);
+        if (around.contested) guess = compete(eyes, around, {i % kStep, i / kStep}, {x, y}, guess);
+        if ((around.contested || around.ragged) && eyes.left_mask.at<uchar>(y, x) &&
+            !confirmed(eyes, {x, y}, guess.disparity))
+          continue;
         map.disparity_px.at<float>(y, x) = guess.disparity;
         map.deviation_px.at<float>(y, x) = deviation_px(guess.information);
         map.correlation.at<float>(y, x) = guess.correlation;

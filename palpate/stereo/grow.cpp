@@ -2,6 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -10,19 +11,22 @@
 namespace palpate {
 namespace {
 
+constexpr int kLooks = 4;       // Gauss-Newton steps of a fit
 constexpr int kTogether = 256;  // the best matches that hand on their planes at a time
 constexpr float kLeastCorrelation = 0.6f;
 constexpr float kLeastSeedCorrelation = 0.8f;
-constexpr float kMostStep = 0.75f;   // half-size px from the prediction of a neighbour
+constexpr int kScale = 2;            // works on images so many times smaller
+constexpr int kStep = 4;             // between cells, px of those images
+constexpr float kMostStep = 0.75f;   // px of those images from the prediction of a neighbour
 constexpr float kSteepest = 0.8f;    // disparity gradient limit
-constexpr float kMostReturn = 0.5f;  // half-size px, left-right check
-constexpr int kSmallestIsland = 60;  // cells
+constexpr float kMostReturn = 0.5f;  // px of those images, left-right check
+constexpr int kSmallestIsland = 15;  // cells
 
-Level halve(const cv::Mat& grey, const cv::Mat& mask) {
-  cv::Mat half, half_mask;
-  cv::pyrDown(grey, half);
-  cv::resize(mask, half_mask, half.size(), 0, 0, cv::INTER_NEAREST);
-  return make_level(half, half_mask);
+Level shrunk(const cv::Mat& grey, const cv::Mat& mask) {
+  cv::Mat small = grey, small_mask;
+  for (int scale = 1; scale < kScale; scale *= 2) cv::pyrDown(small, small);
+  cv::resize(mask, small_mask, small.size(), 0, 0, cv::INTER_NEAREST);
+  return make_level(small, small_mask);
 }
 
 // A plane that a neighbour hands on, and what the fit from there found.
@@ -36,21 +40,19 @@ struct Proposal {
 class Grower {
  public:
   Grower(const Eyes& eyes, double least, double most)
-      : left_(halve(eyes.left, eyes.left_mask)),
-        right_(halve(eyes.right, eyes.right_mask)),
-        least_(static_cast<float>(least / 2)),
-        most_(static_cast<float>(most / 2)),
-        wanted_(eyes.wanted) {
-    grid_.columns = (eyes.left.cols + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
-    grid_.rows = (eyes.left.rows + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
+      : least_(static_cast<float>(least / kScale)), most_(static_cast<float>(most / kScale)), wanted_(eyes.wanted) {
+    tbb::parallel_invoke([&] { left_ = shrunk(eyes.left, eyes.left_mask); },
+                         [&] { right_ = shrunk(eyes.right, eyes.right_mask); });
+    grid_.columns = (left_.size.width + kStep - 1) / kStep;
+    grid_.rows = (left_.size.height + kStep - 1) / kStep;
     grid_.cells.resize(static_cast<size_t>(grid_.columns * grid_.rows));
     proposed_.resize(grid_.cells.size());
   }
 
   CellGrid run(const Seeds& seeds) {
     for (const Seed& seed : seeds.matches)
-      propose(cvRound(seed.left_px.x / CellGrid::kStep_px), cvRound(seed.left_px.y / CellGrid::kStep_px),
-              {seed.disparity_px / 2, 0, 0});
+      propose(cvRound(seed.left_px.x / (kStep * kScale)), cvRound(seed.left_px.y / (kStep * kScale)),
+              {seed.disparity_px / kScale, 0, 0});
     try_proposals(kLeastSeedCorrelation);
     while (!queue_.empty()) {
       for (int i = 0; i < kTogether && !queue_.empty(); ++i) {
@@ -61,24 +63,22 @@ class Grower {
     }
     check_from_the_right();
     drop_islands();
-    for (Cell& cell : grid_.cells) cell.plane.d *= 2;  // slopes are the same at every size
-    return std::move(grid_);
+    return drawn_large();
   }
 
  private:
-  static constexpr int kHalfStep = CellGrid::kStep_px / 2;
-
-  static bool fit(const Level& from, const Level& to, cv::Point at, const DisparityPlane& predicted, WindowFit& found) {
+  static bool fit(const Level& from, const Level& to, cv::Point at, const DisparityPlane& predicted, int looks,
+                  WindowFit& found) {
     Window window;
-    return window.cut(from, at) && window.fit(to, predicted, kMostStep, kSteepest, 4, found);
+    return window.cut(from, at) && window.fit(to, predicted, kMostStep, kSteepest, looks, found);
   }
 
   void propose(int column, int row, const DisparityPlane& plane) {
     if (!grid_.holds(column, row)) return;
     const int index = row * grid_.columns + column;
-    const cv::Point at(column * kHalfStep, row * kHalfStep);
+    const cv::Point at(column * kStep, row * kStep);
     if (grid_.at(column, row).matched || proposed_[static_cast<size_t>(index)] || !left_.holds(at) ||
-        !wanted_.at<uchar>(row * CellGrid::kStep_px, column * CellGrid::kStep_px))
+        !wanted_.at<uchar>(row * kStep * kScale, column * kStep * kScale))
       return;
     proposed_[static_cast<size_t>(index)] = true;
     proposals_.push_back({index, plane});
@@ -88,7 +88,7 @@ class Grower {
     const int column = index % grid_.columns, row = index / grid_.columns;
     const DisparityPlane from = grid_.at(column, row).plane;
     for (const auto& [i, j] : {std::pair{-1, 0}, std::pair{1, 0}, std::pair{0, -1}, std::pair{0, 1}}) {
-      const float shift = kHalfStep * (static_cast<float>(i) * from.dx + static_cast<float>(j) * from.dy);
+      const float shift = kStep * (static_cast<float>(i) * from.dx + static_cast<float>(j) * from.dy);
       propose(column + i, row + j, {from.d + shift, from.dx, from.dy});
     }
   }
@@ -99,9 +99,9 @@ class Grower {
         tbb::blocked_range<size_t>(0, proposals_.size(), 16), [&](const tbb::blocked_range<size_t>& some) {
           for (size_t i = some.begin(); i != some.end(); ++i) {
             Proposal& proposal = proposals_[i];
-            const cv::Point at(proposal.index % grid_.columns * kHalfStep, proposal.index / grid_.columns * kHalfStep);
+            const cv::Point at(proposal.index % grid_.columns * kStep, proposal.index / grid_.columns * kStep);
             WindowFit& found = proposal.found;
-            proposal.accepted = fit(left_, right_, at, proposal.plane, found) &&
+            proposal.accepted = fit(left_, right_, at, proposal.plane, kLooks, found) &&
                                 found.correlation >= least_correlation && found.plane.d >= least_ &&
                                 found.plane.d <= most_;
           }
@@ -129,14 +129,46 @@ class Grower {
   // Seen from the right pixel u' = u - d(u), the plane reads d' = d0 + dx (u - u0), u = (u' + ...) / (1 - dx).
   bool found_again(int column, int row) const {
     const DisparityPlane& plane = grid_.at(column, row).plane;
-    const float x = static_cast<float>(column * kHalfStep) - plane.d;
-    const cv::Point at(cvRound(x), row * kHalfStep);
+    const float x = static_cast<float>(column * kStep) - plane.d;
+    const cv::Point at(cvRound(x), row * kStep);
     const float stretch = 1 / (1 - plane.dx);
     const float off = (static_cast<float>(at.x) - x) * stretch;
     const DisparityPlane expected{-(plane.d + plane.dx * off), -plane.dx * stretch, -plane.dy * stretch};
     WindowFit seen;
-    return right_.holds(at) && fit(right_, left_, at, expected, seen) &&
+    return right_.holds(at) && fit(right_, left_, at, expected, 1, seen) &&
            std::abs(seen.plane.d - expected.d) < kMostReturn;
+  }
+
+  // The cells of the full size, each with the plane of the nearest cell found.
+  CellGrid drawn_large() const {
+    CellGrid large;
+    large.columns = (wanted_.cols + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
+    large.rows = (wanted_.rows + CellGrid::kStep_px - 1) / CellGrid::kStep_px;
+    large.cells.resize(static_cast<size_t>(large.columns * large.rows));
+    constexpr int ratio = kStep * kScale / CellGrid::kStep_px;
+    for (int row = 0; row < large.rows; ++row)
+      for (int column = 0; column < large.columns; ++column) {
+        const Cell* nearest = nullptr;
+        int least = 2 * ratio * ratio + 1;
+        for (int j = 0; j < 2; ++j)
+          for (int i = 0; i < 2; ++i) {
+            const int c = column / ratio + i, r = row / ratio + j;
+            if (!grid_.holds(c, r) || !grid_.at(c, r).matched) continue;
+            const int x = column - c * ratio, y = row - r * ratio, distance = x * x + y * y;
+            if (distance > least || (nearest && distance == least && grid_.at(c, r).correlation < nearest->correlation))
+              continue;
+            least = distance;
+            nearest = &grid_.at(c, r);
+          }
+        if (!nearest) continue;
+        const int index = static_cast<int>(nearest - grid_.cells.data());
+        const float u = static_cast<float>((column - index % grid_.columns * ratio) * CellGrid::kStep_px);
+        const float v = static_cast<float>((row - index / grid_.columns * ratio) * CellGrid::kStep_px);
+        Cell& cell = large.at(column, row);
+        cell = *nearest;
+        cell.plane.d = kScale * nearest->plane.d + nearest->plane.dx * u + nearest->plane.dy * v;
+      }
+    return large;
   }
 
   void drop_islands() {
@@ -159,7 +191,7 @@ class Grower {
       if (!grid_.holds(c, r)) continue;
       const size_t next = static_cast<size_t>(r * grid_.columns + c);
       if (visited[next] || !grid_.cells[next].matched) continue;
-      if (std::abs(grid_.cells[next].plane.d - d) > 2 * kSteepest * kHalfStep) continue;
+      if (std::abs(grid_.cells[next].plane.d - d) > 2 * kSteepest * kStep) continue;
       visited[next] = 1;
       island.push_back(static_cast<int>(next));
     }

@@ -28,8 +28,9 @@ struct CellGrid {
 
 /// Best-first region growing (Lhuillier, Quan 2002; Stoyanov 2010): the match with the highest correlation hands its
 /// disparity plane to the neighbours, each fits the plane to its own window (Gauss-Newton, gain and offset free) and is
-/// accepted when the correlation is high and the disparity changes no faster than the limit. Works on images half as
-/// large. Afterwards each match has to be found again from the right image.
+/// accepted when the correlation is high and the disparity changes no faster than the limit. The best few hundred hand
+/// on together, so that their neighbours are tried in parallel. Works on images half as large with cells twice as far
+/// apart; each match has to be found again from the right image, and the cells of the grid take the nearest plane.
 CellGrid grow(const Eyes& eyes, const Seeds& seeds, double least_disparity_px, double most_disparity_px);
 
 }  // namespace palpate

@@ -17,10 +17,11 @@ inline FloatLanes load_lanes(const float* from) {
 
 /// Eight numbers from here, eight from there.
 inline FloatLanes load_halves(const float* first, const float* second) {
-  FloatLanes lanes;
-  std::memcpy(&lanes, first, sizeof(lanes) / 2);
-  std::memcpy(reinterpret_cast<char*>(&lanes) + sizeof(lanes) / 2, second, sizeof(lanes) / 2);
-  return lanes;
+  using Eight = float __attribute__((vector_size(8 * sizeof(float))));
+  Eight a, b;
+  std::memcpy(&a, first, sizeof(a));
+  std::memcpy(&b, second, sizeof(b));
+  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 }
 
 inline void store_lanes(const FloatLanes& lanes, float* to) {
@@ -42,14 +43,10 @@ inline FloatLanes gather(const float* from, const IntLanes& index) {
 
 /// Sum over the lanes, halves added to halves.
 inline float total(const FloatLanes& lanes) {
-  using Eight = float __attribute__((vector_size(8 * sizeof(float))));
-  using Four = float __attribute__((vector_size(4 * sizeof(float))));
-  Eight eights[2];
-  std::memcpy(eights, &lanes, sizeof(lanes));
-  const Eight eight = eights[0] + eights[1];
-  Four fours[2];
-  std::memcpy(fours, &eight, sizeof(eight));
-  const Four four = fours[0] + fours[1];
+  const auto eight = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3, 4, 5, 6, 7) +
+                     __builtin_shufflevector(lanes, lanes, 8, 9, 10, 11, 12, 13, 14, 15);
+  const auto four =
+      __builtin_shufflevector(eight, eight, 0, 1, 2, 3) + __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
   return (four[0] + four[2]) + (four[1] + four[3]);
 }
 

@@ -116,9 +116,15 @@ Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_dispar
   std::vector<uchar> found, found_back;
   std::vector<float> error;
   const cv::Size window(21, 21);
+  constexpr int kLevels = 2;
+  std::vector<cv::Mat> left_pyramid, right_pyramid;
+  cv::buildOpticalFlowPyramid(left, left_pyramid, window, kLevels);
+  cv::buildOpticalFlowPyramid(right, right_pyramid, window, kLevels);
   const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 15, 0.02);
-  cv::calcOpticalFlowPyrLK(left, right, corners, there, found, error, window, 2, until, cv::OPTFLOW_USE_INITIAL_FLOW);
-  cv::calcOpticalFlowPyrLK(right, left, there, back, found_back, error, window, 2, until, cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::calcOpticalFlowPyrLK(left_pyramid, right_pyramid, corners, there, found, error, window, kLevels, until,
+                           cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::calcOpticalFlowPyrLK(right_pyramid, left_pyramid, there, back, found_back, error, window, kLevels, until,
+                           cv::OPTFLOW_USE_INITIAL_FLOW);
 
   const cv::Rect image({0, 0}, left.size());
   std::vector<size_t> kept;

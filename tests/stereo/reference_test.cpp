@@ -1,8 +1,7 @@
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "palpate/stereo/match.h"
 #include "palpate/stereo/recording.h"
+#include "tests/stereo/truth_cases.h"
 #include "tests/support/reference_data.h"
 
 // Measured on the reference data; limits stand a little above what was measured, and below what OpenCV's semi-global
@@ -10,88 +9,33 @@
 namespace palpate {
 namespace {
 
-struct Score {
-  double mean_px = 0, median_px = 0, above_one_px = 0, coverage = 0, within_one_deviation = 0;
+struct Limits {
+  const char* name;
+  double mean_px, median_px, above_one_px, covered;
 };
 
-Score score(const DisparityMap& map, const cv::Mat& truth_px, const cv::Mat& region) {
-  std::vector<double> errors;
-  Score result;
-  int pixels = 0;
-  for (int y = 0; y < truth_px.rows; ++y)
-    for (int x = 0; x < truth_px.cols; ++x) {
-      if (!region.at<uchar>(y, x)) continue;
-      ++pixels;
-      const double d = map.disparity_px.at<float>(y, x);
-      if (std::isnan(d)) continue;
-      const double error = std::abs(d - truth_px.at<float>(y, x));
-      errors.push_back(error);
-      result.mean_px += error;
-      result.above_one_px += error > 1;
-      result.within_one_deviation += error < map.deviation_px.at<float>(y, x);
-    }
-  const double count = static_cast<double>(errors.size());
-  result.mean_px /= count;
-  result.above_one_px /= count;
-  result.within_one_deviation /= count;
-  result.coverage = count / pixels;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  result.median_px = *middle;
-  return result;
+class KnownDisparity : public testing::TestWithParam<Limits> {};
+
+TEST_P(KnownDisparity, IsFoundAndTheDeviationHolds) {
+  const Limits limits = GetParam();
+  PALPATE_NEEDS_REFERENCE(limits.name);
+  const test::TruthCase c = test::read_truth_case(limits.name);
+  const test::MatchScore got =
+      score(match(c.pair, c.rectification, cv::Mat(c.pair.left.size(), CV_8U, cv::Scalar(255)), c.options), c);
+  EXPECT_LT(got.mean_px, limits.mean_px);
+  EXPECT_LT(got.median_px, limits.median_px);
+  EXPECT_LT(got.above_one_px, limits.above_one_px);
+  EXPECT_GT(got.covered, limits.covered);
+  EXPECT_GT(got.within_both_deviations, 0.58);
+  EXPECT_LT(got.within_both_deviations, 0.78);
 }
 
-class RenderedOrgan : public testing::TestWithParam<const char*> {};
-
-TEST_P(RenderedOrgan, IsMatchedFarBelowAPixel) {
-  PALPATE_NEEDS_REFERENCE(GetParam());
-  const std::filesystem::path folder = test::reference_data() / GetParam();
-  RecordingOptions options;
-  options.left = folder / "left.mp4";
-  options.right = folder / "right.mp4";
-  options.calibration = folder / "calibration.yaml";
-  Recording recording(options);
-  const Rectification rectification = make_rectification(read_rig(options.calibration), recording.size());
-  EXPECT_TRUE(rectification.identity);
-  const RectifiedPair pair = rectify(rectification, *recording.next());
-  const cv::Mat depth = cv::imread((folder / "depth0_left.tiff").string(), cv::IMREAD_UNCHANGED);
-  const cv::Mat truth = rectification.focal_px * rectification.baseline_mm / depth;
-  const cv::Mat organ = cv::imread((folder / "id0_left.png").string(), cv::IMREAD_GRAYSCALE) == 1;
-
-  const Score got =
-      score(match(pair, rectification, cv::Mat(recording.size(), CV_8U, cv::Scalar(255)), {}), truth, organ);
-  EXPECT_LT(got.mean_px, 0.10);
-  EXPECT_LT(got.median_px, 0.045);
-  EXPECT_LT(got.above_one_px, 0.008);
-  EXPECT_GT(got.coverage, 0.97);
-  EXPECT_GT(got.within_one_deviation, 0.5);
-  EXPECT_LT(got.within_one_deviation, 0.86);
-}
-
-INSTANTIATE_TEST_SUITE_P(Reference, RenderedOrgan, testing::Values("rendered_liver", "rendered_uterus"));
-
-TEST(PorcineAbdomen, AgreesWithStructuredLight) {
-  PALPATE_NEEDS_REFERENCE("scared_keyframe");
-  const std::filesystem::path folder = test::reference_data() / "scared_keyframe";
-  RectifiedPair pair;
-  pair.left = cv::imread((folder / "left.png").string());
-  pair.right = cv::imread((folder / "right.png").string());
-  cv::Mat truth;
-  cv::imread((folder / "disparity_px.tiff").string(), cv::IMREAD_UNCHANGED).convertTo(truth, CV_32F);
-  const cv::Mat hidden = cv::imread((folder / "occlusion.png").string(), cv::IMREAD_GRAYSCALE) == 128;
-  Rectification rectification;
-  rectification.size = pair.left.size();
-  rectification.focal_px = 517.5;
-  rectification.baseline_mm = 4.1435;
-  rectification.identity = true;
-  rectification.valid_left = cv::Mat(pair.left.size(), CV_8U, cv::Scalar(255));
-  rectification.valid_right = rectification.valid_left;
-  const Score got = score(match(pair, rectification, rectification.valid_left, {}), truth, (truth > 0) & ~hidden);
-  EXPECT_LT(got.mean_px, 0.33);
-  EXPECT_LT(got.median_px, 0.24);
-  EXPECT_LT(got.above_one_px, 0.032);
-  EXPECT_GT(got.coverage, 0.88);
-}
+INSTANTIATE_TEST_SUITE_P(Reference, KnownDisparity,
+                         testing::Values(Limits{"scared_keyframe", 0.31, 0.225, 0.025, 0.93},
+                                         Limits{"rendered_liver", 0.08, 0.03, 0.004, 0.98},
+                                         Limits{"rendered_uterus", 0.06, 0.035, 0.002, 0.98},
+                                         Limits{"motorcycle", 0.55, 0.13, 0.063, 0.83}),
+                         [](const auto& one) { return std::string(one.param.name); });
 
 TEST(LivingTissue, IsCoveredAndItsRowOffsetFound) {
   PALPATE_NEEDS_REFERENCE("surgt_tissue");
