@@ -138,7 +138,7 @@ std::string phi_table() {
   setenv("PALPATE_REFERENCE_DATA", std::filesystem::absolute(data).c_str(), 0);
   for (const char* name : {"rendered_uterus", "rendered_liver"})
     if (std::filesystem::exists(data / name)) table += phi_row(name, data / name / "scene.yaml");
-  for (const char* name : {"surgt_tissue", "hamlyn_heart"})
+  for (const char* name : {"surgt_tissue", "hamlyn_heart", "scared_keyframe"})
     if (std::filesystem::exists(data / name))
       table += phi_row(name, std::filesystem::path(PALPATE_SOURCE_DIR) / "studies" / (std::string(name) + ".yaml"));
   return table;
