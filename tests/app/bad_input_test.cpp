@@ -202,6 +202,11 @@ TEST_F(BadInput, AFocusOutsideTheOrganIsNamed) {
   EXPECT_THAT(complaint(), HasSubstr("map.focus_px"));
 }
 
+TEST_F(BadInput, FramesToFuseThatRunBackwardsAreRefused) {
+  spoil_scene("frame: 0", "frames: [5, 2]");
+  EXPECT_THAT(complaint(), HasSubstr("map.frames is [5, 2]"));
+}
+
 TEST_F(BadInput, RegisteringWithoutAVolumeIsRefused) {
   spoil_scene("thickness_mm: 15", "thickness_mm: 15, register: true");
   EXPECT_THAT(complaint(), HasSubstr("map.register needs map.volume"));

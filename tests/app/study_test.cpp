@@ -1,0 +1,122 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/app/program.h"
+
+namespace palpate::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kScene = R"(map: {elements: 600}
+tissue: {law: linear, young_modulus_kPa: 10, poisson_ratio: 0.3}
+attachments: [{underside: {depth_mm: 8}}]
+contact: {footprint_radius_mm: 5, grip: grasp}
+simulate:
+  body: {shape: slab, size_mm: [80, 60, 30], center_mm: [0, 0, 90], elements: 900}
+  camera: {width: 480, height: 270, focal_px: 350, baseline_mm: 5, fps: 10}
+  gesture:
+    - {approach_s: 0.5, at_px: [240, 135]}
+    - {grasp: true}
+    - {move_mm: [2, 0, 0], during_s: 0.4}
+    - {hold_s: 0.2}
+    - {release: true, leave_s: 0.2}
+)";
+
+constexpr const char* kStudy = R"(title: Small
+experiments:
+  - name: plain
+    scene: slab.yaml
+    goals: {force_nrmse_pct: 25}
+  - name: modulus
+    scene: slab.yaml
+    sweep: {key: tissue.young_modulus_kPa, unit: kPa, logarithmic: true, times: {from: 1, to: 100, steps: 3}}
+    quick: 2
+  - name: wrong
+    scene: slab.yaml
+    estimate: {map.thickness_mm: -1}
+)";
+
+int lines_with(const std::string& text, const std::string& part) {
+  std::istringstream stream(text);
+  int count = 0;
+  for (std::string line; std::getline(stream, line);) count += line.find(part) != std::string::npos;
+  return count;
+}
+
+class Study : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_file(workspace / "slab.yaml", kScene);
+    write_file(workspace / "study.yaml", kStudy);
+  }
+  Outcome study(const std::string& more) const {
+    return run_palpate("study " + (workspace / "study.yaml").string() + " -o " + (workspace / "out").string() + " " +
+                       more);
+  }
+  nlohmann::json result(const std::string& run) const {
+    return nlohmann::json::parse(read_file(workspace / ("out/runs/" + run + "/result.json")));
+  }
+  const Workspace workspace;
+};
+
+TEST_F(Study, WhatTheEstimateAloneIsToldSharesOneSequence) {
+  const Outcome outcome = study("--list-runs");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  EXPECT_EQ(lines_with(outcome.output, "--run sequence:slab-"), 1);
+  EXPECT_EQ(lines_with(outcome.output, "--run modulus/"), 3);
+  EXPECT_EQ(lines_with(outcome.output, "palpate study "), 6);
+  EXPECT_EQ(lines_with(study("--list-runs --quick").output, "--run modulus/"), 2);
+  EXPECT_EQ(lines_with(study("--list-runs --only plain").output, "palpate study "), 2);
+}
+
+TEST_F(Study, TheForceIsProportionalToTheModulusAndAFailedRunIsARowWithItsReason) {
+  const Outcome outcome = study("--jobs 2 --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto count = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(count["done"], 4);
+  EXPECT_EQ(count["failed"], 1);
+  EXPECT_NEAR(result("modulus/1000")["peak_force_N"].get<double>() / result("modulus/10")["peak_force_N"].get<double>(),
+              100, 0.01);
+  EXPECT_EQ(result("wrong/run")["status"], "failed");
+  EXPECT_THAT(result("wrong/run")["reason"].get<std::string>(), HasSubstr("map.thickness_mm"));
+  const std::string table = read_file(workspace / "out/results.csv");
+  EXPECT_EQ(lines_with(table, ",done,"), 4);
+  EXPECT_EQ(lines_with(table, ",failed,"), 1);
+  const std::string page = read_file(workspace / "out/report.html");
+  EXPECT_THAT(page, HasSubstr("Chart.js v"));
+  EXPECT_THAT(page, HasSubstr("to the power 1.000"));
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos);
+}
+
+TEST_F(Study, GoesOnWhereItStopped) {
+  ASSERT_EQ(study("--run plain/run").exit_code, 0);
+  const auto made = std::filesystem::last_write_time(workspace / "out/runs/plain/run/result.json");
+  ASSERT_EQ(study("--only plain").exit_code, 0);
+  EXPECT_EQ(std::filesystem::last_write_time(workspace / "out/runs/plain/run/result.json"), made);
+  replace_in_file(workspace / "study.yaml", "goals: {force_nrmse_pct: 25}", "estimate: {map.elements: 700}");
+  ASSERT_EQ(study("--only plain").exit_code, 0);
+  EXPECT_NE(std::filesystem::last_write_time(workspace / "out/runs/plain/run/result.json"), made);
+}
+
+TEST_F(Study, SaysWhatIsWrongWithItsFile) {
+  const auto sentence_of = [this](const std::string& from, const std::string& to) {
+    write_file(workspace / "study.yaml", kStudy);
+    replace_in_file(workspace / "study.yaml", from, to);
+    const Outcome outcome = study("--list-runs");
+    EXPECT_EQ(outcome.exit_code, 3);
+    return outcome.error;
+  };
+  EXPECT_THAT(sentence_of("quick: 2", "quack: 2"), HasSubstr("study.yaml:9: unknown key quack"));
+  EXPECT_THAT(sentence_of("name: modulus", "name: plain"), HasSubstr("two experiments have the name plain"));
+  EXPECT_THAT(sentence_of("steps: 3", "steps: 1"), HasSubstr("range"));
+  EXPECT_THAT(sentence_of("scene: slab.yaml\n    goals", "scene: slob.yaml\n    goals"),
+              HasSubstr("slob.yaml: cannot"));
+  EXPECT_THAT(sentence_of("title: Small", "titel: Small"), HasSubstr("study.yaml:1: unknown key titel"));
+}
+
+}  // namespace
+}  // namespace palpate::test
