@@ -34,7 +34,7 @@ DisparityMap match_quasi_dense(const Eyes& eyes, const Seeds& seeds, double leas
   Level left, right;
   tbb::parallel_invoke([&] { left = softened(eyes.left, eyes.left_mask); },
                        [&] { right = softened(eyes.right, eyes.right_mask); });
-  for (const Reach reach : {Reach{5, 1}, Reach{10, 2}}) {
+  for (const Reach reach : {Reach{5, 1}, Reach{12, 2}}) {
     refine_cells(left, right, grid);
     smooth_cells(grid, reach);
   }
