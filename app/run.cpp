@@ -223,12 +223,17 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
   opened("map", [&] {
     require_region_in_image(scene.map.organ_region_px, recording.size());
     std::optional<StereoFrame> frame = recording.next();
-    while (frame && frame->index < scene.map.frame) frame = recording.next();
+    std::vector<StereoFrame> static_frames;
+    while (frame && frame->index < scene.map.frame) {
+      if (frame->index >= scene.map.first_frame()) static_frames.push_back(*frame);
+      frame = recording.next();
+    }
     if (!frame)
       throw BadInput(
           fmt::format("map.frame is {}, but the recording has only {} frames", scene.map.frame, built.frame_count));
     built.frame = *frame;
-    built.map = build_tissue_map(built.frame, built.rectification, scene.map, scene.tissue, scene.attachments);
+    static_frames.push_back(built.frame);
+    built.map = build_tissue_map(static_frames, built.rectification, scene.map, scene.tissue, scene.attachments);
   });
   return built;
 }

@@ -1,6 +1,9 @@
 #include "palpate/estimate/scene.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/LU>
+#include <cmath>
 
 #include "palpate/core/errors.h"
 
@@ -9,11 +12,17 @@ namespace palpate {
 namespace {
 
 /// What the scene file will hold one day.
-const std::vector<std::string> kMapKeysNotYet = {"frames"};
 const std::vector<std::string> kInstrumentKeysNotYet = {"camera_from_robot", "time_offset_s", "[1]"};
 const std::vector<std::string> kSceneKeysNotYet = {"instruments", "instrument_2"};
 
 void check_map(const MapOptions& options) {
+  constexpr double kMostFrames = 100;
+  const auto [first, last] = std::pair{options.frames.x, options.frames.y};
+  if (first < 0 || last < first || last - first >= kMostFrames || first != std::floor(first) ||
+      last != std::floor(last))
+    throw BadInput(fmt::format(
+        "map.frames is [{:g}, {:g}], expected the first and the last of at most {:g} frames, counted from 0", first,
+        last, kMostFrames));
   if (options.has_focus && !options.focus_px.empty())
     throw BadInput("map has both focus and focus_px, expected one of them");
   if (options.register_volume && options.volume.empty())
@@ -27,6 +36,10 @@ void check_map(const MapOptions& options) {
 
 void describe(Settings& settings, MapOptions& options) {
   settings.integer("frame", options.frame, {0, 1e9}, "the static frame that the map is built from, counted from 0");
+  settings.pixel(
+      "frames", options.frames,
+      "[first, last] frame of a phase in which camera and tissue stand still: their depths are fused, and the "
+      "last of them is the map's frame");
   settings.integer("elements", options.elements, {100, 200000}, "n of Eq. 1, tetrahedra wanted");
   settings.polygon("organ_region_px", options.organ_region_px,
                    "outline of the organ in the left image as recorded; everything when left out");
@@ -64,10 +77,12 @@ void describe(Settings& settings, MapOptions& options) {
   settings.number("focus_edge_ratio", options.focus_edge_ratio, {0.1, 1},
                   "length of the edges there against that far away");
   describe(settings, options.labels);
-  settings.after_reading([&options] { check_map(options); });
+  settings.after_reading([&options] {
+    check_map(options);
+    if (options.frames.x < options.frames.y) options.frame = static_cast<int>(options.frames.y);
+  });
   describe(settings, options.match);
   describe(settings, options.surface);
-  settings.not_yet(kMapKeysNotYet);
 }
 
 void describe(Settings& settings, Scene& scene) {

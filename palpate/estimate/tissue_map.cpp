@@ -10,6 +10,7 @@
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/check_map.h"
 #include "palpate/instrument/segment.h"
+#include "palpate/stereo/fuse.h"
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/triangulate.h"
 #include "palpate/surface/cocone.h"
@@ -80,18 +81,31 @@ double median_of(std::vector<float> values) {
 
 TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectification, const MapOptions& options,
                            const TissueOptions& tissue, const AttachmentOptions& attachments) {
+  return build_tissue_map(std::vector<StereoFrame>{frame}, rectification, options, tissue, attachments);
+}
+
+TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const Rectification& rectification,
+                           const MapOptions& options, const TissueOptions& tissue,
+                           const AttachmentOptions& attachments) {
+  if (static_frames.empty()) throw BadInput("no static frame to build the map from");
+  const StereoFrame& frame = static_frames.back();
   TissueMap map;
   map.tissue = tissue;
   map.element = options.element;
   map.frame = frame.index;
   Stopwatch watch;
-  const RectifiedPair pair = rectify(rectification, frame);
   map.organ_mask = rectified_polygon_mask(rectification, options.organ_region_px);
-  const cv::Mat mask = tissue_mask(pair, rectification, map.organ_mask);
-  map.report.rectify_ms = watch.lap_ms();
-
-  map.disparity = match(pair, rectification, mask, options.match);
-  map.report.match_ms = watch.lap_ms();
+  RectifiedPair pair;
+  std::vector<DisparityMap> disparities;
+  for (const StereoFrame& one : static_frames) {
+    pair = rectify(rectification, one);
+    const cv::Mat mask = tissue_mask(pair, rectification, map.organ_mask);
+    map.report.rectify_ms += watch.lap_ms();
+    disparities.push_back(match(pair, rectification, mask, options.match));
+    map.report.match_ms += watch.lap_ms();
+  }
+  map.disparity = disparities.size() == 1 ? disparities.front() : fuse(disparities);
+  map.report.match_ms += watch.lap_ms();
 
   map.cloud = triangulate(map.disparity, rectification, pair.left);
   map.report.triangulate_ms = watch.lap_ms();

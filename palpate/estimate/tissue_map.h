@@ -21,7 +21,10 @@ namespace palpate {
 /// `map` of the scene file.
 struct MapOptions {
   int frame = 0;
+  cv::Point2d frames;  ///< first and last of the static frames that are fused; equal = `frame` alone
   int elements = 1344;
+
+  int first_frame() const { return frames.x < frames.y ? static_cast<int>(frames.x) : frame; }
   std::vector<cv::Point2d> organ_region_px;
   double thickness_mm = 25;
   std::filesystem::path volume;
@@ -71,5 +74,10 @@ struct TissueMap {
 /// Phi of Eq. 1. Throws BadInput with a sentence where a stage cannot go on.
 TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectification, const MapOptions& options,
                            const TissueOptions& tissue, const AttachmentOptions& attachments);
+
+/// From several frames in which camera and tissue stand still; the last one is the static frame of the map.
+TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const Rectification& rectification,
+                           const MapOptions& options, const TissueOptions& tissue,
+                           const AttachmentOptions& attachments);
 
 }  // namespace palpate

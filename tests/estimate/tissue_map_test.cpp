@@ -78,6 +78,17 @@ TEST_F(RenderedUterus, AScanThatLiesElsewhereIsRegistered) {
   EXPECT_LT(largest, 0.6);
 }
 
+TEST_F(RenderedUterus, SeveralStillFramesLowerTheDeviationAndTheLastOneIsTheMaps) {
+  Recording recording(scene_.recording);
+  std::vector<StereoFrame> frames;
+  for (int i = 0; i < 6; ++i) frames.push_back(*recording.next());
+  const TissueMap one = build();
+  const TissueMap fused = build_tissue_map(frames, rectification_, scene_.map, scene_.tissue, scene_.attachments);
+  EXPECT_EQ(fused.frame, 5);
+  EXPECT_GT(fused.report.coverage, 0.9 * one.report.coverage);
+  EXPECT_LT(fused.report.median_depth_deviation_mm, 0.95 * one.report.median_depth_deviation_mm);
+}
+
 TEST_F(RenderedUterus, AScanThatDoesNotFitIsRefusedWithItsResidual) {
   give_moved_scan();
   scene_.map.register_limit_mm = 0.01;
