@@ -10,6 +10,17 @@ constexpr int kFewestPoints = 6;
 /// Motion below this cannot be told from noise at endoscopic baselines.
 constexpr double kLeastTellingMotion_mm = 0.15;
 constexpr double kLeastFollowingShare = 0.35;
+
+/// Of the release detector: frames looked back; predicted motion across the ray that tells (RMS over the points): less
+/// can come from the depth of the tip, which jitters; the share of it that held tissue shows at least.
+constexpr size_t kFramesBack = 3;
+constexpr double kLeastTellingStep_mm = 0.09;
+constexpr double kLeastFollowingStepShare = 0.2;
+
+Vec3 across(const Vec3& motion, const Vec3& at) {
+  const Vec3 ray = at.normalized();
+  return motion - motion.dot(ray) * ray;
+}
 }  // namespace
 
 Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm) {
@@ -39,6 +50,31 @@ Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Ve
   follow.let_go = follow.points >= kFewestPoints && follow.predicted_mm > kLeastTellingMotion_mm &&
                   follow.share < kLeastFollowingShare;
   return follow;
+}
+
+bool ReleaseDetector::update(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm) {
+  std::map<int, Motion> now;
+  for (size_t i = 0; i < seen.size(); ++i)
+    now[seen[i].number] = {across(seen[i].displacement_mm, seen[i].rest_mm), across(predicted_mm[i], seen[i].rest_mm)};
+  bool let_go = false;
+  for (size_t back = 1; back <= frames_.size(); ++back) {
+    const auto& before = frames_[frames_.size() - back];
+    int points = 0;
+    double seen_predicted = 0, predicted_squared = 0;
+    for (const auto& [number, motion] : now) {
+      const auto found = before.find(number);
+      if (found == before.end()) continue;
+      const Vec3 step = motion.predicted_mm - found->second.predicted_mm;
+      seen_predicted += step.dot(motion.seen_mm - found->second.seen_mm);
+      predicted_squared += step.squaredNorm();
+      ++points;
+    }
+    let_go |= points >= kFewestPoints && predicted_squared > points * kLeastTellingStep_mm * kLeastTellingStep_mm &&
+              seen_predicted < kLeastFollowingStepShare * predicted_squared;
+  }
+  frames_.push_back(std::move(now));
+  if (frames_.size() > kFramesBack) frames_.pop_front();
+  return let_go;
 }
 
 }  // namespace palpate

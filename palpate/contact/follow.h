@@ -1,5 +1,8 @@
 #pragma once
 
+#include <deque>
+#include <map>
+
 #include "palpate/contact/tissue_motion.h"
 #include "palpate/core/geometry.h"
 
@@ -16,5 +19,22 @@ struct Follow {
 
 /// `predicted_mm`: motion of the model at the rest position of each point.
 Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm);
+
+/// Sees a tip let go by the last few frames alone, whatever happened since onset: the tip moves, and the tissue, which
+/// was to come along, stays. Only motion across the viewing ray counts; it is known to a hundredth of a millimetre.
+class ReleaseDetector {
+ public:
+  void start() { frames_.clear(); }
+
+  /// Arguments as of compare_motion, every frame of a contact; true in the frame that shows the release.
+  bool update(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm);
+
+ private:
+  struct Motion {
+    Vec3 seen_mm;
+    Vec3 predicted_mm;
+  };
+  std::deque<std::map<int, Motion>> frames_;  ///< the last ones, by number of the point
+};
 
 }  // namespace palpate

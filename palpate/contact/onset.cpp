@@ -15,6 +15,8 @@ constexpr double kApproachStep_mm = 0.3;
 constexpr double kRestAcross_mm = 0.15;
 /// ... and along it, where endoscopic baselines leave noise.
 constexpr double kRestAlong_mm = 0.6;
+/// However badly the tip is known, it does not touch from twice the threshold away.
+constexpr double kMostSlackShare = 0.5;
 constexpr double kLeaveDistance_mm = 2;
 /// One frame may be a bad triangulation.
 constexpr int kFramesSurelyInside = 2;
@@ -33,7 +35,7 @@ bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& t
   if (recent_tips_.size() > kRecentFrames) recent_tips_.pop_front();
   if (let_go_at_mm_ || recent_tips_.size() < 3) return false;
 
-  const double slack_mm = std::min(2 * gap_deviation_mm, threshold_mm_);
+  const double slack_mm = std::min(2 * gap_deviation_mm, kMostSlackShare * threshold_mm_);
   if (gap_mm > threshold_mm_ + slack_mm) return false;
   frames_inside_ = gap_mm < -(threshold_mm_ + slack_mm) ? frames_inside_ + 1 : 0;
   if (frames_inside_ > 0) return frames_inside_ >= kFramesSurelyInside;

@@ -215,6 +215,7 @@ std::vector<TissuePoint> TissueMotion::update(const RectifiedPair& pair, const c
     s.right_last[i] = seen ? in_right.points[i] : s.right_points[i];
     if (!seen) continue;
     TissuePoint point;
+    point.number = static_cast<int>(i);
     point.rest_mm = s.point(s.left_points[i], s.right_points[i]);
     point.displacement_mm = s.point(in_left.points[i], in_right.points[i]) - point.rest_mm;
     const double z = rectified_depth_mm(s.rectification, point.rest_mm + point.displacement_mm);

@@ -9,6 +9,7 @@ namespace palpate {
 
 /// One point of the tissue followed in both images since a reference frame; left camera frame.
 struct TissuePoint {
+  int number = 0;                       ///< the same for the same point in every frame since the reference
   Vec3 rest_mm = Vec3::Zero();          ///< where it was in the reference frame
   Vec3 displacement_mm = Vec3::Zero();  ///< since then
   double deviation_mm = 0;              ///< one standard deviation of the displacement along the viewing ray

@@ -44,6 +44,7 @@ struct ForceEstimator::State {
   TipTracker tracker;
   OnsetDetector onset;
   TissueMotion tissue_motion;
+  ReleaseDetector release;
   std::optional<HeldContact> held;
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
@@ -70,6 +71,7 @@ struct ForceEstimator::State {
     held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options, map.element);
     onset_tip_mm = tip.tip_mm;
     tracker.mark();
+    release.start();
     tissue_motion.start(pair, tip.left_mask, gap.surface_point_mm,
                         std::max(kLeastWatched_mm, kWatchedRadii * radius_mm));
   }
@@ -110,9 +112,10 @@ struct ForceEstimator::State {
     const std::vector<TissuePoint> seen = tissue_motion.update(pair, tip.left_mask, tip.right_mask);
     std::vector<Vec3> rest;
     for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
-    const Follow follow =
-        compare_motion(seen, displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest));
-    if (follow.let_go) {
+    const std::vector<Vec3> predicted = displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest);
+    const Follow follow = compare_motion(seen, predicted);
+    const bool stays_behind = release.update(seen, predicted);
+    if (follow.let_go || stays_behind) {
       estimate.tip_mm = tip.tip_mm;
       end_contact(tip.tip_mm);
       return std::nullopt;

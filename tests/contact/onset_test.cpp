@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 namespace palpate {
@@ -24,6 +25,17 @@ TEST(Onset, ATipThatComesToRestOnTheSurfaceTouches) {
 
 TEST(Onset, ATipThatHoversAboveTheThresholdNeverTouches) {
   EXPECT_EQ(onset_of({8, 6, 4, 3, 3, 3, 3, 3, 3, 3}), -1);
+}
+
+TEST(Onset, ATipThatHoversAtThreeMillimetresNeverTouchesHoweverBadlyItIsKnown) {
+  for (double deviation_mm : {0.1, 0.5, 1.0, 3.0}) {
+    OnsetDetector onset(kThreshold_mm);
+    for (int frame = 0; frame < 200; ++frame) {
+      const double tremor = 0.3 * std::sin(0.9 * frame);
+      const double gap_mm = frame < 5 ? 9 - frame : 3 + tremor;
+      EXPECT_FALSE(onset.update(gap_mm, deviation_mm, {5, 5 + tremor, 90 - gap_mm})) << frame << ' ' << deviation_mm;
+    }
+  }
 }
 
 TEST(Onset, ATipOnItsWayPastTheSurfaceDoesNotTouch) {
