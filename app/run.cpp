@@ -235,6 +235,8 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
     static_frames.push_back(built.frame);
     built.map = build_tissue_map(static_frames, built.rectification, scene.map, scene.tissue, scene.attachments);
   });
+  if (!quiet)
+    for (const std::string& warning : built.map.disparity.warnings) fmt::print(stderr, "warning     {}\n", warning);
   return built;
 }
 
@@ -243,7 +245,6 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
   MeshArrays arrays;
   arrays.node_scalars["fixed"].assign(map.mesh.nodes_mm.size(), 0.0);
   for (int node : map.fixed_nodes) arrays.node_scalars["fixed"][static_cast<size_t>(node)] = 1;
-  arrays.element_scalars["label"].assign(map.mesh.label.begin(), map.mesh.label.end());
   write_vtu(folder / "map.vtu", map.mesh, arrays);
   write_ply(folder / "surface.ply", map.surface);
   write_ply(folder / "cloud.ply", map.cloud);

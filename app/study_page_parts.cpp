@@ -68,7 +68,7 @@ function table(parent, experiment) {
   if (Object.keys(experiment.goals).length) {
     const row = add(body, 'tr', undefined, 'soft');
     add(row, 'td', 'goal');
-    shown.forEach(c => add(row, 'td', c.name in experiment.goals ? 'at most ' + experiment.goals[c.name] : ''));
+    shown.forEach(c => add(row, 'td', c.name in experiment.goals ? '\u2264 ' + experiment.goals[c.name] : ''));
     add(row, 'td', experiment.expects_warning || '');
   }
   experiment.runs.forEach(run => {

@@ -139,7 +139,7 @@ std::string surface_accuracy_table() {
         const Figures figures = judge(truth, sampling.view, surface, seen);
         table += fmt::format(" {:.3f} / {:.2f}{}{} |", figures.distance_mm, figures.angle_deg,
                              figures.missing_pct < 1 ? "" : fmt::format(", {:.0f} % open", figures.missing_pct),
-                             has_right_topology(surface, truth.name == "torus patch" ? 0 : 1) ? "" : ", topology");
+                             has_right_topology(surface, euler) ? "" : ", topology");
         if (in_hole.empty())
           in_hole = std::isfinite(figures.hole_mm) ? fmt::format(" {:.2f} |\n", figures.hole_mm) : " |\n";
       };

@@ -20,6 +20,7 @@ std::string map_json(const TissueMap& map, const Rectification& rectification) {
   json["times_ms"] = {
       {"rectify", r.rectify_ms}, {"match", r.match_ms},   {"triangulate", r.triangulate_ms}, {"clean", r.clean_ms},
       {"surface", r.surface_ms}, {"volume", r.volume_ms}, {"attachments", r.attachments_ms}};
+  if (!map.disparity.warnings.empty()) json["warnings"] = map.disparity.warnings;
   json["coverage"] = r.coverage;
   json["median_depth_deviation_mm"] = r.median_depth_deviation_mm;
   json["smallest_dihedral_deg"] = r.mesh.smallest_dihedral_deg;
