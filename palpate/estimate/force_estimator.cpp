@@ -1,12 +1,15 @@
 #include "palpate/estimate/force_estimator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "palpate/contact/detect.h"
 #include "palpate/contact/follow.h"
 #include "palpate/contact/held_contact.h"
+#include "palpate/contact/map_watch.h"
 #include "palpate/contact/onset.h"
 #include "palpate/contact/tissue_motion.h"
 #include "palpate/core/stopwatch.h"
@@ -16,8 +19,12 @@ namespace palpate {
 
 namespace {
 
-/// Frames without the tip after which a held contact is given up.
-constexpr int kMostLostFrames = 5;
+/// Time without the tip after which a held contact is given up. Until then the contact waits: whether the tip still
+/// holds the tissue when it is seen again is what the tissue's motion says.
+constexpr double kLongestLost_s = 2;
+/// After a longer loss than a flicker, the tissue has to be seen to follow.
+constexpr int kFlickerFrames = 5;
+constexpr int kFewestFollowingPoints = 6;
 /// Elements around the footprint are split until their edges are no longer than its radius: finer ones change the force
 /// by less than 3 %.
 constexpr double kFootprintEdgeShare = 1;
@@ -26,6 +33,20 @@ constexpr double kFootprintReach = 1;
 constexpr double kWatchedRadii = 3.5;
 constexpr double kLeastWatched_mm = 8;
 constexpr double kStaleMisfit_mm = 3;
+
+/// A part of the picture that tells whether it is the same one again; a copy, because grabbers use their buffers again.
+cv::Mat every_fourth_pixel(const cv::Mat& picture) {
+  cv::Mat part;
+  cv::resize(picture, part, {}, 0.25, 0.25, cv::INTER_NEAREST);
+  return part;
+}
+
+/// Decoders and grabbers hand out a picture twice when none is new; two pictures of a camera always differ by noise.
+bool same_picture(const cv::Mat& a, const cv::Mat& b) {
+  if (a.empty() || a.size() != b.size()) return false;
+  constexpr double kLeastNoise_levels = 0.02;
+  return cv::norm(a, b, cv::NORM_L1) < kLeastNoise_levels * 3 * static_cast<double>(a.total());
+}
 
 std::vector<Vec3> deformed(const TetModel& model, const Eigen::VectorXd& u) {
   std::vector<Vec3> nodes = model.rest_mm();
@@ -42,6 +63,8 @@ struct ForceEstimator::State {
   AttachmentOptions attachments;
   ContactOptions options;
   TipTracker tracker;
+  MapWatch map_watch;
+  std::array<cv::Mat, 2> last_pictures;
   OnsetDetector onset;
   TissueMotion tissue_motion;
   ReleaseDetector release;
@@ -49,7 +72,8 @@ struct ForceEstimator::State {
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
   std::optional<bool> was_closed;  // jaws of the free tip, where a tip track says so
-  int lost_frames = 0;
+  int lost_frames = 0;             // up to this one, without a gap
+  double last_seen_s = 0;
 
   State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
         const InstrumentOptions& instrument, const ContactOptions& contact)
@@ -59,8 +83,15 @@ struct ForceEstimator::State {
         attachments(a),
         options(contact),
         tracker(instrument, rectification, rectify(rectification, static_frame), map.organ_mask),
+        map_watch(rectify(rectification, static_frame).left, {}),
         onset(contact.threshold_mm),
         tissue_motion(rectification) {}
+
+  bool is_repeated(const RectifiedPair& pair) {
+    std::array<cv::Mat, 2> pictures = {every_fourth_pixel(pair.left), every_fourth_pixel(pair.right)};
+    std::swap(pictures, last_pictures);
+    return same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
+  }
 
   void begin_contact(const RectifiedPair& pair, const TipObservation& tip, const Gap& gap) {
     const double radius_mm = options.footprint_radius_mm;
@@ -115,7 +146,8 @@ struct ForceEstimator::State {
     const std::vector<Vec3> predicted = displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest);
     const Follow follow = compare_motion(seen, predicted);
     const bool stays_behind = release.update(seen, predicted);
-    if (follow.let_go || stays_behind) {
+    const bool cannot_tell = lost_frames > kFlickerFrames && follow.points < kFewestFollowingPoints;
+    if (follow.let_go || stays_behind || cannot_tell) {
       estimate.tip_mm = tip.tip_mm;
       end_contact(tip.tip_mm);
       return std::nullopt;
@@ -161,31 +193,45 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   Stopwatch watch;
 
   const RectifiedPair pair = rectify(s.rectification, frame);
+  const bool repeated = s.is_repeated(pair);
   estimate.times.rectify_ms = watch.lap_ms();
 
   const TipObservation tip = s.tracker.update(pair);
   estimate.left_instrument_mask = tip.left_mask;
+  if (tip.eyes_out_of_step) estimate.warnings.push_back("eyes_out_of_step");
+  MapWatch::Answer scene;
+  if (frame.index > s.map.frame) scene = s.map_watch.update(pair.left, tip.left_mask);
   estimate.times.track_ms = watch.lap_ms();
 
-  if (!tip.visible) {
+  if (!tip.visible || scene.veiled) {
     estimate.status = FrameStatus::tool_lost;
-    if (s.held && ++s.lost_frames > kMostLostFrames) s.end_contact(s.last_tip_mm);
+    ++s.lost_frames;
+    if (s.held && frame.time_s - s.last_seen_s > kLongestLost_s) s.end_contact(s.last_tip_mm);
     if (!s.held) s.onset.lose();
     return estimate;
   }
-  s.lost_frames = 0;
+  s.last_seen_s = frame.time_s;
   s.last_tip_mm = tip.tip_mm;
   estimate.tip_mm = tip.tip_mm;
 
-  if (!s.held && frame.index > s.map.frame) s.look_for_contact(pair, tip);
+  // Where the map no longer lies nothing begins to touch it, and a picture that stands still says nothing about the
+  // tip.
+  const bool stale = scene.map_is_stale;
+  if (stale) estimate.status = FrameStatus::map_stale;
+  if (!s.held && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, tip);
   estimate.times.contact_ms = watch.lap_ms();
-  if (!s.held) return estimate;
+  if (!s.held) {
+    s.lost_frames = 0;
+    return estimate;
+  }
 
   const auto equilibrium = s.solve_contact(pair, tip, estimate);
+  s.lost_frames = 0;
   estimate.times.solve_ms = watch.lap_ms();
   if (!equilibrium) return estimate;
 
   s.report(*equilibrium, estimate);
+  if (stale && estimate.status == FrameStatus::ok) estimate.status = FrameStatus::map_stale;
   if (estimate.status == FrameStatus::not_converged) return estimate;
   estimate.node_von_mises_kPa = node_von_mises_kPa(s.held->model(), equilibrium->u);
   estimate.max_von_mises_kPa =

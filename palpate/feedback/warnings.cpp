@@ -10,6 +10,7 @@ const std::vector<std::pair<std::string, std::string>>& known_warnings() {
       {"inverted_elements", "elements of the map turned inside out"},
       {"near_attachment", "contact close to where the tissue is held"},
       {"sliding", "the tip slides over the tissue"},
+      {"eyes_out_of_step", "the two videos do not show the same moment"},
   };
   return kWarnings;
 }

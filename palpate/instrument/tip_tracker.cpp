@@ -7,6 +7,7 @@
 #include <array>
 
 #include "palpate/core/errors.h"
+#include "palpate/instrument/eye_lag.h"
 #include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/rigid_motion.h"
 #include "palpate/instrument/segment.h"
@@ -109,6 +110,8 @@ struct TipTracker::State {
   std::array<SegmentationModel, 2> models;
 
   TipFilter filter;
+  EyeLag eye_lag;
+  bool eyes_out_of_step = false;                          ///< as last found; it stays so while nothing moves
   std::optional<ImageTip> last_left_tip, last_right_tip;  ///< where to look when a mask shows none
   std::optional<InstrumentKeyframe> keyframe;
   std::optional<InstrumentKeyframe> fresh_keyframe;  ///< of the last frame, should it be marked
@@ -300,6 +303,11 @@ TipObservation TipTracker::update(const RectifiedPair& pair) {
   s.advance(measured, followed, detection, seconds);
   s.visible = true;
 
+  if (detection) {
+    s.eye_lag.add(pair.index, left.tip->tip_px.y, right.tip->tip_px.y);
+    s.eyes_out_of_step = s.eye_lag.frames().value_or(s.eyes_out_of_step ? 1 : 0) != 0;
+  }
+  observation.eyes_out_of_step = s.eyes_out_of_step;
   if (left.tip) s.last_left_tip = left.tip;
   if (right.tip) s.last_right_tip = right.tip;
   s.report_since_mark(observation);

@@ -31,6 +31,7 @@ struct TipObservation {
   std::optional<bool> closed;  ///< jaws hold, where a tip track says so
   cv::Mat left_mask;           ///< 255 = instrument, rectified left image; empty with a tip track
   cv::Mat right_mask;
+  bool eyes_out_of_step = false;  ///< the eyes show different moments: whatever moves is misplaced
 };
 
 /// p of the paper: segmentation, tip in both images, pyramidal Lucas-Kanade between frames, epipolar match,

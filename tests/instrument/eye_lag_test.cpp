@@ -1,0 +1,37 @@
+#include "palpate/instrument/eye_lag.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+/// What is found after 16 frames of a tip that moves by `step_px` rows per frame, with the right eye ahead by `lag`
+/// frames and its rows 2 px lower.
+std::optional<int> found_lag(double step_px, int lag, bool with_a_gap = false) {
+  EyeLag eyes;
+  const auto row = [&](double t) { return 200 + step_px * t + 0.1 * step_px * t * std::sin(0.4 * t); };
+  for (int t = 0; t < 16; ++t) {
+    const double jitter = 0.4 * std::sin(12.9 * t), other_jitter = 0.4 * std::cos(7.7 * t);
+    eyes.add(with_a_gap && t > 10 ? t + 3 : t, row(t) + jitter, row(t + lag) + 2 + other_jitter);
+  }
+  return eyes.frames();
+}
+
+TEST(EyeLag, TellsWhichEyeIsAhead) {
+  EXPECT_EQ(found_lag(3, 0), 0);
+  EXPECT_EQ(found_lag(3, 1), 1);
+  EXPECT_EQ(found_lag(-3, -1), -1);
+}
+
+TEST(EyeLag, SaysNothingOfATipThatStaysInItsRow) {
+  EXPECT_FALSE(found_lag(0.1, 1).has_value());
+}
+
+TEST(EyeLag, SaysNothingRightAfterDroppedFrames) {
+  EXPECT_FALSE(found_lag(3, 1, true).has_value());
+}
+
+}  // namespace
+}  // namespace palpate
