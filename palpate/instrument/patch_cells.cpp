@@ -171,6 +171,7 @@ CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, i
     right += w * r * g;
     rr += w * r * r;
     w1 += w;
+    if (cell.outline) continue;
     // What light does to a cell while it moves: brighter, and more so towards one side.
     const Eigen::Vector4f light(1, per_length * s.dx, per_length * s.dy, s.value / 100);
     light_normal += w * light * light.transpose();

@@ -1,5 +1,7 @@
 #include "palpate/instrument/rigid_motion.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -28,6 +30,16 @@ struct System {
   Unknowns right = Unknowns::Zero();
   double information = 0, full_information = 0, squared_error = 0, weight = 0;
   double agreement() const { return full_information > 0 ? information / full_information : 0; }
+
+  System& operator+=(const System& other) {
+    normal += other.normal;
+    right += other.right;
+    information += other.information;
+    full_information += other.full_information;
+    squared_error += other.squared_error;
+    weight += other.weight;
+    return *this;
+  }
 };
 
 /// Where one eye sees the instrument; `shift_mm` is the eye's place along the baseline.
@@ -128,9 +140,14 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
   System system;
   for (int level = ImageLayers::kLevels - 1; level >= 0; --level)
     for (int pass = 0; pass < 8; ++pass) {
+      const auto cells_at = [level](const PatchTemplate& eye) -> const auto& {
+        return eye.cells[static_cast<size_t>(level)];
+      };
       system = System();
-      add_eye(keyframe.left.cells[static_cast<size_t>(level)], left_eye, keyframe, left, level, p, system);
-      add_eye(keyframe.right.cells[static_cast<size_t>(level)], right_eye, keyframe, right, level, p, system);
+      System of_right;
+      tbb::parallel_invoke([&] { add_eye(cells_at(keyframe.left), left_eye, keyframe, left, level, p, system); },
+                           [&] { add_eye(cells_at(keyframe.right), right_eye, keyframe, right, level, p, of_right); });
+      system += of_right;
       const Normal normal = system.normal + prior + 1e-6 * Normal::Identity();
       const Unknowns step = normal.ldlt().solve(system.right - prior * p);
       p += step;
