@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "palpate/core/errors.h"
@@ -98,6 +100,10 @@ void check_gesture(const std::vector<GestureRow>& rows) {
     }
   }
   if (!approached) throw BadInput("simulate.gesture: no row with approach_s and at_px");
+}
+
+Vec3 breath_mm(const SimulatedBreathing& breathing, double time_s) {
+  return 0.5 * (1 - std::cos(2 * std::numbers::pi * time_s / breathing.period_s)) * breathing.motion_mm;
 }
 
 double gesture_duration_s(const std::vector<GestureRow>& rows) {

@@ -12,7 +12,6 @@
 #include "palpate/simulate/baked_texture.h"
 #include "palpate/simulate/noise.h"
 #include "palpate/simulate/ray_scene.h"
-#include "palpate/simulate/sensor.h"
 
 namespace palpate {
 namespace {
@@ -144,7 +143,7 @@ struct Renderer::Scene {
     const Bundle<bool> blocked = rays.blocked(faces_light, from, to);
     for (size_t i = 0; i < kBundle; ++i) {
       samples[i].surface = hits[i].surface;
-      samples[i].depth_mm = hits[i].length;
+      samples[i].depth_mm = hits[i].surface < 0 ? std::numeric_limits<float>::infinity() : hits[i].length;
       samples[i].colour = lit[i].around;
       if (!blocked[i]) samples[i].colour += lit[i].direct;
     }
@@ -183,7 +182,7 @@ struct Renderer::Scene {
     return sum;
   }
 
-  cv::Mat draw(int eye, uint32_t frame) const {
+  cv::Mat draw(int eye, uint32_t frame, cv::Mat& depth_mm) const {
     const int width = camera.width, height = camera.height;
     const auto corner_columns = static_cast<size_t>(width) + 1;
     std::vector<Sample> corners(corner_columns * (static_cast<size_t>(height) + 1));
@@ -192,6 +191,7 @@ struct Renderer::Scene {
                  width + 1);
     });
     cv::Mat linear(height, width, CV_32FC3);
+    depth_mm.create(height, width, CV_32F);
     tbb::parallel_for(0, height, [&](int y) {
       std::vector<Sample> middles(static_cast<size_t>(width));
       sample_row(eye, 0, static_cast<float>(y), frame, middles.data(), width);
@@ -200,6 +200,7 @@ struct Renderer::Scene {
         const Vec3f rgb = pixel_colour(eye, x, y, frame, middles[static_cast<size_t>(x)],
                                        {corner, corner + 1, corner + corner_columns, corner + corner_columns + 1});
         linear.at<cv::Vec3f>(y, x) = {rgb.z(), rgb.y(), rgb.x()};
+        depth_mm.at<float>(y, x) = middles[static_cast<size_t>(x)].depth_mm;
       }
     });
     return linear;
@@ -235,16 +236,21 @@ void Renderer::move(int surface, const std::vector<Vec3>& vertices_mm) {
   scene_->rays.place(surface, vertices_mm);
 }
 
-StereoFrame Renderer::render(int index) {
+StereoLight Renderer::light(int index, double time_s) {
   scene_->rays.commit();
-  StereoFrame frame;
-  frame.index = index;
-  frame.time_s = index / scene_->camera.fps;
   const auto number = static_cast<uint32_t>(index);
-  const auto seed = static_cast<uint32_t>(scene_->look.seed);
-  frame.left = sensor_image(scene_->draw(0, number), scene_->look.noise, hash_bits(number, 0, 0, seed));
-  frame.right = sensor_image(scene_->draw(1, number), scene_->look.noise, hash_bits(number, 1, 0, seed));
-  return frame;
+  StereoLight light;
+  cv::Mat right_depth_mm;
+  light.left = scene_->draw(0, number, light.left_depth_mm);
+  light.right = scene_->draw(1, number, right_depth_mm);
+  const auto eye_mm = [this](int eye) -> Vec3 { return scene_->eye_mm(eye).cast<double>(); };
+  add_smoke(light.left, light.left_depth_mm, scene_->camera, scene_->look, eye_mm(0), time_s);
+  add_smoke(light.right, right_depth_mm, scene_->camera, scene_->look, eye_mm(1), time_s);
+  return light;
+}
+
+StereoFrame Renderer::render(int index) {
+  return recorded(light(index, index / scene_->camera.fps), scene_->camera, scene_->look, index);
 }
 
 cv::Mat Renderer::visible_mask(int surface) {

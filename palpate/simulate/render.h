@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "palpate/core/geometry.h"
+#include "palpate/simulate/optics.h"
 #include "palpate/simulate/texture.h"
 
 namespace palpate {
@@ -30,8 +31,11 @@ class Renderer {
   /// New places of all vertices of a surface.
   void move(int surface, const std::vector<Vec3>& vertices_mm);
 
-  /// Both images, 8-bit BGR, with anti-aliasing and sensor noise. The same for any number of threads; `index` is the
-  /// frame and seeds the noise.
+  /// Light that arrives at both eyes at a moment, with anti-aliasing and smoke. The same for any number of threads;
+  /// `index` is the frame and seeds the points of the light that cast shadows.
+  StereoLight light(int index, double time_s);
+
+  /// Both images of a frame as recorded, 8-bit BGR.
   StereoFrame render(int index);
 
   /// 255 where the left eye sees this surface before all others.

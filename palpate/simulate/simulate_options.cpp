@@ -56,6 +56,23 @@ void describe_noise(Settings& settings, SimulatedNoise& noise) {
                   "what is added at white, of 255 levels; its variance grows with the level");
 }
 
+void describe_border(Settings& settings, SimulatedBorder& border) {
+  settings.number("radius_px", border.radius_px, {0, 10000},
+                  "radius of the round field of view around the middle of the image, 0 = none, px");
+  settings.number("blur_px", border.blur_px, {0, 1000}, "width of its blurred edge, px");
+}
+
+void describe_smoke(Settings& settings, SimulatedSmoke& smoke) {
+  settings.number("density", smoke.density, {0, 10},
+                  "light keeps exp(-density) of itself over 100 mm, and grey takes the place of the rest; 0 = none");
+  settings.number("wisps", smoke.wisps, {0, 1}, "how uneven it is; wisps drift; 0 = even");
+}
+
+void describe_blood(Settings& settings, SimulatedBlood& blood) {
+  settings.number("covered", blood.covered, {0, 0.9}, "share of the organ under patches of blood");
+  settings.number("patch_mm", blood.patch_mm, {0, 100, true}, "size of a patch, mm");
+}
+
 void describe_look(Settings& settings, SimulatedLook& look) {
   settings.path("texture", look.texture, "procedural, or an image of tissue that is laid on from three sides");
   settings.number("texture_mm_per_px", look.texture_mm_per_px, {0, 10, true},
@@ -66,6 +83,14 @@ void describe_look(Settings& settings, SimulatedLook& look) {
   settings.group("light", "the light of the scope; brightness falls with the square of the distance",
                  [&look](Settings& s) { describe_light(s, look.light); });
   settings.group("noise", "of the sensor", [&look](Settings& s) { describe_noise(s, look.noise); });
+  settings.group("border", "the blurred edge of the scope's view",
+                 [&look](Settings& s) { describe_border(s, look.border); });
+  settings.group("smoke", "of cautery: contrast is lost, more where it is deeper",
+                 [&look](Settings& s) { describe_smoke(s, look.smoke); });
+  settings.group("blood", "dark smooth patches that move with the tissue",
+                 [&look](Settings& s) { describe_blood(s, look.blood); });
+  settings.flag("interlace", look.interlace,
+                "odd rows show the scene half a frame later; truth.csv is of the even rows, depth of each row its own");
   settings.after_reading([&look] { settle_word_or_file("simulate.look.texture", look.texture, {"procedural"}); });
 }
 
@@ -94,6 +119,12 @@ void describe_instrument(Settings& settings, SimulatedInstrument& instrument) {
                   "how far from the contact the tip begins and ends, along the shaft, mm");
 }
 
+void describe_breathing(Settings& settings, SimulatedBreathing& breathing) {
+  settings.vector3("motion_mm", breathing.motion_mm, {-100, 100},
+                   "how far the whole scene has moved half a period after the start, left camera frame, mm");
+  settings.number("period_s", breathing.period_s, {0.1, 60}, "time of one breath, s");
+}
+
 void describe_gesture_row(Settings& settings, GestureRow& row) {
   settings.number("approach_s", row.approach_s, {0, 60},
                   "come in, free, and touch the tissue at the end of this time, s");
@@ -119,6 +150,11 @@ void describe(Settings& settings, SimulateOptions& options) {
   settings.group("camera", "both eyes", [&](Settings& s) { describe_camera(s, options.camera); });
   settings.group("instrument", "what touches the tissue",
                  [&](Settings& s) { describe_instrument(s, options.instrument); });
+  settings.group(
+      "breathing",
+      "the whole scene moves by motion_mm (1 - cos(2 pi t / period_s)) / 2; moves of the gesture are measured "
+      "from the moving tissue, so that the force is the same without",
+      [&](Settings& s) { describe_breathing(s, options.breathing); });
   settings.list(
       "gesture",
       "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, grasp, "

@@ -28,6 +28,22 @@ struct SimulatedNoise {
   double shot_levels = 1.2;  ///< additional standard deviation at white; its variance grows with the level
 };
 
+/// Edge of the scope's round field of view, in the middle of the image.
+struct SimulatedBorder {
+  double radius_px = 0;  ///< 0 = the whole image is seen
+  double blur_px = 24;   ///< width of the edge
+};
+
+struct SimulatedSmoke {
+  double density = 0;  ///< optical depth of 100 mm; 0 = none
+  double wisps = 0.5;  ///< how uneven it is, 0 = even
+};
+
+struct SimulatedBlood {
+  double covered = 0;    ///< share of the organ
+  double patch_mm = 10;  ///< size of a patch
+};
+
 /// `simulate.look`.
 struct SimulatedLook {
   std::filesystem::path texture = "procedural";  ///< procedural, or an image laid on from three sides
@@ -37,6 +53,10 @@ struct SimulatedLook {
   double exposure = 0.85;
   SimulatedLight light;
   SimulatedNoise noise;
+  SimulatedBorder border;
+  SimulatedSmoke smoke;
+  SimulatedBlood blood;
+  bool interlace = false;  ///< odd rows are half a frame later
 };
 
 /// `simulate.camera`: both eyes alike, parallel, no distortion, principal point in the middle of the image.
@@ -69,12 +89,19 @@ struct GestureRow {
   double leave_s = 0;
 };
 
+/// `simulate.breathing`: the whole scene (organ, what lies behind it, instrument) goes there and back.
+struct SimulatedBreathing {
+  Vec3 motion_mm = Vec3::Zero();  ///< from expired (where the sequence begins) to inspired, left camera frame
+  double period_s = 4;
+};
+
 /// `simulate` of the scene file.
 struct SimulateOptions {
   SimulatedBody body;
   SimulatedLook look;
   SimulatedCamera camera;
   SimulatedInstrument instrument;
+  SimulatedBreathing breathing;
   std::vector<GestureRow> gesture;
 };
 

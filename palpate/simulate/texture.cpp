@@ -14,6 +14,8 @@ namespace {
 
 using Colour = Eigen::Vector3f;
 
+const uint32_t kLevelSamples = 20000;  // of a noise whose quantiles are wanted
+
 float smooth_step(float from, float to, float x) {
   const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
   return t * t * (3 - 2 * t);
@@ -113,6 +115,29 @@ Texture tissue_texture(const SimulatedLook& look) {
                                                                                                 const Vec3& normal) {
     Texel texel = bumps(rest_mm, normal);
     texel.albedo = map.at(rest_mm, normal);
+    return texel;
+  };
+}
+
+Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed_number) {
+  if (blood.covered <= 0) return clean;
+  const uint32_t seed = 1000u * static_cast<uint32_t>(seed_number) + 700u;
+  const auto size_mm = static_cast<float>(blood.patch_mm);
+  const auto pooled = [seed, size_mm](const Eigen::Vector3f& p) { return fractal_noise(p / size_mm, seed, 3).value; };
+  // The level that the stated share of space lies above.
+  std::vector<float> levels(kLevelSamples);
+  for (uint32_t i = 0; i < kLevelSamples; ++i) {
+    const auto anywhere = [&](uint32_t axis) { return 60 * size_mm * unit_from_bits(hash_bits(i, axis, 9, seed)); };
+    levels[i] = pooled({anywhere(0), anywhere(1), anywhere(2)});
+  }
+  const auto dry = static_cast<std::ptrdiff_t>((1 - blood.covered) * (kLevelSamples - 1));
+  std::nth_element(levels.begin(), levels.begin() + dry, levels.end());
+  const float level = levels[static_cast<size_t>(dry)];
+  return [clean, pooled, level](const Vec3& rest_mm, const Vec3& normal) {
+    Texel texel = clean(rest_mm, normal);
+    const float share = smooth_step(level - 0.03f, level + 0.03f, pooled(rest_mm.cast<float>()));
+    texel.albedo = mix(texel.albedo, {0.17f, 0.008f, 0.006f}, 0.93f * share);
+    texel.slope *= 1 - 0.8f * share;
     return texel;
   };
 }

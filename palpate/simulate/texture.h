@@ -20,6 +20,9 @@ using Texture = std::function<Texel(const Vec3& rest_mm, const Vec3& normal)>;
 /// from three sides. Throws BadInput when the image cannot be read.
 Texture tissue_texture(const SimulatedLook& look);
 
+/// The same with patches of blood: dark, with less relief, their share of space as told.
+Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed);
+
 /// The wall of the cavity behind the organ: darker, browner, fat and vessels.
 Texture wall_texture(int seed);
 

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "palpate/simulate/render.h"
+#include "palpate/simulate/truth_motion.h"
+
+namespace palpate {
+
+/// The three surfaces that are drawn: organ, the wall of the cavity behind it, instrument.
+class Stage {
+ public:
+  /// `organ` at rest; the instrument in `first_place`.
+  Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth,
+        const InstrumentPlace& first_place);
+
+  /// 255 where the left eye sees the organ before all others.
+  cv::Mat organ_mask() { return renderer_.visible_mask(organ_number_); }
+
+  /// Puts everything in place.
+  void show(const Moment& moment);
+  /// Light of what is shown; see Renderer::light.
+  StereoLight light(int index, double time_s) { return renderer_.light(index, time_s); }
+  /// The organ as it is shown, left camera frame.
+  const Surface& shown_organ() const { return shown_organ_; }
+
+ private:
+  SimulateOptions options_;
+  Surface organ_, wall_, shown_organ_;
+  Skin skin_;
+  Renderer renderer_;
+  int organ_number_ = 0, wall_number_ = 0, instrument_number_ = 0;
+};
+
+}  // namespace palpate

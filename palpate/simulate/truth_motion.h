@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "palpate/elastic/material.h"
+#include "palpate/simulate/dejavu_files.h"
+#include "palpate/simulate/instrument_shape.h"
+#include "palpate/simulate/simulate_options.h"
+#include "palpate/simulate/truth_body.h"
+
+namespace palpate {
+
+/// Where and how the tissue is touched, at rest. Columns of `axes`: outward normal, tangents to the right and down.
+struct TouchPoint {
+  Vec3 point_mm;
+  Mat3 axes;
+};
+
+/// The point of the organ that the left eye sees at `at_px`. Throws BadInput when it sees none there.
+TouchPoint find_touch_point(const Surface& organ, const SimulatedCamera& camera, cv::Point2d at_px);
+
+/// Everything that is known at one moment before a picture is drawn.
+struct Moment {
+  TruthRow truth;
+  InstrumentPlace place;
+  Vec3 breath_mm = Vec3::Zero();  ///< by which the whole scene is displaced
+  Eigen::VectorXd u;              ///< of the true nodes, mm, without breathing; empty = at rest
+};
+
+/// What the equilibria of a sequence have in common.
+struct MotionQuality {
+  double largest_residual = 0;
+  double smallest_volume_ratio = 1;
+};
+
+/// The moments of `frames` frames, or of twice as many fields when the pictures are interlaced (field 2 k belongs to
+/// frame k, field 2 k + 1 is half a frame later). `step` is called after every moment. Throws BadInput when the tissue
+/// finds no equilibrium.
+std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
+                                 const TouchPoint& touch, int frames, MotionQuality& quality,
+                                 const std::function<void()>& step);
+
+/// Pixel of an eye at (eye_x_mm, 0, 0), parallel to the left one, without distortion.
+cv::Point2d project(const SimulatedCamera& camera, const Vec3& point_mm, double eye_x_mm);
+
+}  // namespace palpate
