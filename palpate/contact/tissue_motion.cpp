@@ -11,7 +11,7 @@ namespace palpate {
 
 namespace {
 
-constexpr int kMostPoints = 120;
+constexpr int kMostPoints = 80;
 constexpr int kWindow_px = 21;
 constexpr int kLevels = 3;
 constexpr double kForwardBackward_px = 0.3;
@@ -93,7 +93,7 @@ Tracks follow(const EyePart& from, const EyePart& to, const std::vector<cv::Poin
   tracks.points = guess;
   tracks.good.assign(start.size(), 0);
   if (start.empty()) return tracks;
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 30, 0.005);
+  const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 20, 0.01);
   std::vector<uchar> forward, backward;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(from.grey, to.grey, start, tracks.points, forward, error, {kWindow_px, kWindow_px}, kLevels,
