@@ -11,9 +11,11 @@ constexpr int kFewestPoints = 6;
 constexpr double kLeastTellingMotion_mm = 0.15;
 constexpr double kLeastFollowingShare = 0.35;
 
-/// Of the release detector: frames looked back; predicted motion across the ray that tells (RMS over the points): less
-/// can come from the depth of the tip, which jitters; the share of it that held tissue shows at least.
+/// Of the release detector: frames looked back; motion across the ray that tells, of the tip and predicted (RMS over
+/// the points): the depth of the tip jitters, and the model turns some of that into motion across the ray; the share of
+/// it that held tissue shows at least.
 constexpr size_t kFramesBack = 3;
+constexpr double kLeastTipStep_mm = 0.3;
 constexpr double kLeastTellingStep_mm = 0.09;
 constexpr double kLeastFollowingStepShare = 0.2;
 
@@ -52,13 +54,15 @@ Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Ve
   return follow;
 }
 
-bool ReleaseDetector::update(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm) {
+bool ReleaseDetector::update(const Vec3& tip_mm, const std::vector<TissuePoint>& seen,
+                             const std::vector<Vec3>& predicted_mm) {
   std::map<int, Motion> now;
   for (size_t i = 0; i < seen.size(); ++i)
     now[seen[i].number] = {across(seen[i].displacement_mm, seen[i].rest_mm), across(predicted_mm[i], seen[i].rest_mm)};
   bool let_go = false;
   for (size_t back = 1; back <= frames_.size(); ++back) {
-    const auto& before = frames_[frames_.size() - back];
+    const auto& [tip_before_mm, before] = frames_[frames_.size() - back];
+    if (across(tip_mm - tip_before_mm, tip_mm).norm() < kLeastTipStep_mm) continue;
     int points = 0;
     double seen_predicted = 0, predicted_squared = 0;
     for (const auto& [number, motion] : now) {
@@ -72,7 +76,7 @@ bool ReleaseDetector::update(const std::vector<TissuePoint>& seen, const std::ve
     let_go |= points >= kFewestPoints && predicted_squared > points * kLeastTellingStep_mm * kLeastTellingStep_mm &&
               seen_predicted < kLeastFollowingStepShare * predicted_squared;
   }
-  frames_.push_back(std::move(now));
+  frames_.push_back({tip_mm, std::move(now)});
   if (frames_.size() > kFramesBack) frames_.pop_front();
   return let_go;
 }

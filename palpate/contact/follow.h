@@ -26,15 +26,20 @@ class ReleaseDetector {
  public:
   void start() { frames_.clear(); }
 
-  /// Arguments as of compare_motion, every frame of a contact; true in the frame that shows the release.
-  bool update(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm);
+  /// Every frame of a contact: where the tip is, the rest as of compare_motion. True in the frame that shows the
+  /// release.
+  bool update(const Vec3& tip_mm, const std::vector<TissuePoint>& seen, const std::vector<Vec3>& predicted_mm);
 
  private:
   struct Motion {
     Vec3 seen_mm;
     Vec3 predicted_mm;
   };
-  std::deque<std::map<int, Motion>> frames_;  ///< the last ones, by number of the point
+  struct Frame {
+    Vec3 tip_mm;
+    std::map<int, Motion> points;  ///< by number
+  };
+  std::deque<Frame> frames_;  ///< the last ones
 };
 
 }  // namespace palpate

@@ -145,7 +145,7 @@ struct ForceEstimator::State {
     for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
     const std::vector<Vec3> predicted = displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest);
     const Follow follow = compare_motion(seen, predicted);
-    const bool stays_behind = release.update(seen, predicted);
+    const bool stays_behind = release.update(estimate.tip_mm, seen, predicted);
     const bool cannot_tell = lost_frames > kFlickerFrames && follow.points < kFewestFollowingPoints;
     if (follow.let_go || stays_behind || cannot_tell) {
       estimate.tip_mm = tip.tip_mm;
