@@ -47,7 +47,8 @@ System assemble(const Problem& problem, int level, const Vector4& p) {
   System system;
   const cv::Point2d tip = problem.tip;
   for (const PatchCell& cell : problem.left.cells[static_cast<size_t>(level)]) {
-    const CellEquations e = cell_equations(cell, problem.right, level, warp_cell(cell, problem, p), kNoise);
+    const CellEquations e =
+        cell_equations(cell, problem.right, level, warp_cell(cell, problem, p), kNoise, Light::offset);
     Eigen::Matrix<double, 2, 4> jacobian;
     jacobian << -1, -(cell.center_px.x - tip.x), -(cell.center_px.y - tip.y), 0, 0, 0, 0, 1;
     system.normal += jacobian.transpose() * e.normal * jacobian;

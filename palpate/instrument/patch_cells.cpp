@@ -129,7 +129,7 @@ PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, cons
 }
 
 CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp,
-                             const LayerNoise& noise) {
+                             const LayerNoise& noise, Light light_model) {
   const cv::Mat& image =
       cell.outline ? layers.metal[static_cast<size_t>(level)] : layers.brightness[static_cast<size_t>(level)];
   const float per_noise = 1 / (cell.outline ? noise.metal : noise.brightness);
@@ -173,7 +173,8 @@ CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, i
     w1 += w;
     if (cell.outline) continue;
     // What light does to a cell while it moves: brighter, and more so towards one side.
-    const Eigen::Vector4f light(1, per_length * s.dx, per_length * s.dy, s.value / 100);
+    Eigen::Vector4f light(1, per_length * s.dx, per_length * s.dy, s.value / 100);
+    if (light_model == Light::offset) light.tail<3>().setZero();
     light_normal += w * light * light.transpose();
     light_right += w * r * light;
     cross += w * g * light.transpose();

@@ -56,9 +56,13 @@ struct LayerNoise {
   float metal;
 };
 
-/// Lucas-Kanade's normal equations of one cell for a shift of its centre, with outliers weighted down. For brightness,
-/// offset, gain and a linear ramp over the cell are eliminated: shading stays with the light, not with the instrument.
-/// Residuals are in units of their expected noise.
+/// What is eliminated of a cell's brightness: an offset, which holds over a long way, or gain and a linear ramp as
+/// well, which take the bias of shading that stays with the light off a short one, and leave too little to find a long
+/// one by.
+enum class Light { offset, gain_and_ramp };
+
+/// Lucas-Kanade's normal equations of one cell for a shift of its centre, with outliers weighted down. Residuals are in
+/// units of their expected noise.
 struct CellEquations {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -69,6 +73,6 @@ struct CellEquations {
 };
 
 CellEquations cell_equations(const PatchCell& cell, const ImageLayers& layers, int level, const CellWarp& warp,
-                             const LayerNoise& noise);
+                             const LayerNoise& noise, Light light_model);
 
 }  // namespace palpate

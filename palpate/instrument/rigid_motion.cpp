@@ -21,6 +21,8 @@ constexpr double kRotationDeviation_rad = 0.02;  // an instrument in a trocar mo
 // Light slides over a round shaft as it moves, differently for each eye: a shift across the shaft, which an almost
 // level shaft would turn into a disparity many times as large.
 constexpr double kRowDeviation_px = 1.0;
+// A long way needs what the rows say about the depth of such a shaft.
+constexpr double kRowDeviationOfLongWay_px = 0.02;
 constexpr double kLeastAgreement = 0.35;
 constexpr double kLeastMetal = 0.6;
 constexpr double kCorrelatedNoise = 12;
@@ -101,13 +103,13 @@ double metal_share(const std::vector<PatchCell>& cells, const Eye& eye, const In
 }
 
 void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const InstrumentKeyframe& keyframe,
-             const ImageLayers& layers, int level, const Unknowns& p, System& system) {
+             const ImageLayers& layers, int level, const Unknowns& p, Light light, System& system) {
   const double f = eye.rectification.focal_px;
   for (const PatchCell& cell : cells) {
     const Vec3 before = eye.point(keyframe.plane, cell.center_px, cell.height_px);
     const Vec3 now = moved(before, keyframe.tip_mm, p);
     if (now.z() < 5) continue;
-    const CellEquations e = cell_equations(cell, layers, level, warp_of(cell, eye, keyframe, p), kNoise);
+    const CellEquations e = cell_equations(cell, layers, level, warp_of(cell, eye, keyframe, p), kNoise, light);
     Eigen::Matrix<double, 2, 3> projection;
     projection << f / now.z(), 0, -f * (now.x() - eye.shift_mm) / (now.z() * now.z()), 0, f / now.z(),
         -f * now.y() / (now.z() * now.z());
@@ -129,14 +131,15 @@ void add_eye(const std::vector<PatchCell>& cells, const Eye& eye, const Instrume
 
 std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, const ImageLayers& left,
                                           const ImageLayers& right, const Rectification& rectification,
-                                          const RigidMotion& guess) {
+                                          const RigidMotion& guess, Light light) {
   if (left.region.area() == 0 || right.region.area() == 0) return {};
   const Eye left_eye{rectification, 0}, right_eye{rectification, rectification.baseline_mm};
   Unknowns p;
   p << guess.translation_mm, guess.rotation_rad, 0;
   Normal prior = Normal::Zero();
   prior.diagonal().segment<3>(3).setConstant(kCorrelatedNoise / std::pow(kRotationDeviation_rad, 2));
-  prior(kUnknowns - 1, kUnknowns - 1) = kCorrelatedNoise / std::pow(kRowDeviation_px, 2);
+  prior(kUnknowns - 1, kUnknowns - 1) =
+      kCorrelatedNoise / std::pow(light == Light::offset ? kRowDeviationOfLongWay_px : kRowDeviation_px, 2);
   System system;
   for (int level = ImageLayers::kLevels - 1; level >= 0; --level)
     for (int pass = 0; pass < 8; ++pass) {
@@ -145,8 +148,9 @@ std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, co
       };
       system = System();
       System of_right;
-      tbb::parallel_invoke([&] { add_eye(cells_at(keyframe.left), left_eye, keyframe, left, level, p, system); },
-                           [&] { add_eye(cells_at(keyframe.right), right_eye, keyframe, right, level, p, of_right); });
+      tbb::parallel_invoke(
+          [&] { add_eye(cells_at(keyframe.left), left_eye, keyframe, left, level, p, light, system); },
+          [&] { add_eye(cells_at(keyframe.right), right_eye, keyframe, right, level, p, light, of_right); });
       system += of_right;
       const Normal normal = system.normal + prior + 1e-6 * Normal::Identity();
       const Unknowns step = normal.ldlt().solve(system.right - prior * p);

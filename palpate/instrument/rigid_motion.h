@@ -28,6 +28,6 @@ struct RigidMotion {
 /// keyframe. Nothing when too little of the template fits.
 std::optional<RigidMotion> measure_motion(const InstrumentKeyframe& keyframe, const ImageLayers& left,
                                           const ImageLayers& right, const Rectification& rectification,
-                                          const RigidMotion& guess);
+                                          const RigidMotion& guess, Light light);
 
 }  // namespace palpate

@@ -153,11 +153,12 @@ std::optional<RigidMotion> TipTracker::State::motion_since_keyframe(const EyeVie
   if (!keyframe) return {};
   RigidMotion guess = motion;
   if (filter.started()) guess.translation_mm += seconds * filter.velocity_mm_per_s();
-  auto best = measure_motion(*keyframe, left.layers, right.layers, rectification, guess);
+  const Light light = marked ? Light::gain_and_ramp : Light::offset;
+  auto best = measure_motion(*keyframe, left.layers, right.layers, rectification, guess, light);
   if (best && best->agreement > kGoodAgreement) return best;
   if (detection) {
     guess.translation_mm = detection->tip_mm - keyframe->tip_mm;
-    const auto other = measure_motion(*keyframe, left.layers, right.layers, rectification, guess);
+    const auto other = measure_motion(*keyframe, left.layers, right.layers, rectification, guess, light);
     if (other && (!best || other->agreement > best->agreement)) best = other;
   }
   return best;
