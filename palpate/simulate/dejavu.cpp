@@ -67,10 +67,11 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   const TouchPoint touch = find_touch_point(organ, options.camera, approach.at_px);
   const double radius_mm =
       approach.footprint_radius_mm > 0 ? approach.footprint_radius_mm : contact.footprint_radius_mm;
+  const bool push = is_push(options.gesture);
   const TruthBody truth = make_truth_body(
       make_organ(options.body, kFilledTriangles), options.body.elements, attachments,
       [&](const Vec3& point) { return project(options.camera, point, 0); }, touch.point_mm, touch.axes.col(0),
-      radius_mm);
+      radius_mm, push ? longest_drag_mm(options.gesture) : 0);
 
   DejaVuSummary summary;
   summary.frames = static_cast<int>(std::lround(gesture_duration_s(options.gesture) * options.camera.fps)) + 1;
@@ -81,6 +82,7 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   summary.contact_mm = touch.point_mm;
   summary.contact_normal = touch.axes.col(0);
   summary.contact_radius_mm = truth.patch_radius_mm;
+  if (options.write.grip == SimulatedFiles::Grip::known) summary.grip = push ? Grip::push : Grip::grasp;
 
   const int fields = options.look.interlace ? 2 : 1;
   int done = 0;
@@ -90,7 +92,8 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   };
   const auto solve_start = Clock::now();
   MotionQuality quality;
-  const std::vector<Moment> moments = solve_motion(options, tissue, truth, touch, summary.frames, quality, step);
+  const std::vector<Moment> moments =
+      solve_motion(options, tissue, truth, touch, contact.friction, summary.frames, quality, step);
   summarise(moments, summary);
   summary.largest_residual = quality.largest_residual;
   summary.smallest_volume_ratio = quality.smallest_volume_ratio;
@@ -105,16 +108,19 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields)) rows.push_back(moments[i].truth);
   write_truth(folder / "truth.csv", rows);
   StereoVideoWriter video(folder, options.camera);
+  const FrameFiles frame_files(folder, options.write);
   for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields)) {
     const int frame = moments[i].truth.frame;
     stage.show(moments[i]);
     StereoLight light = stage.light(frame, moments[i].truth.time_s);
+    frame_files.write_surface(frame, stage.shown_organ());
     step();
     if (options.look.interlace) {
       stage.show(moments[i + 1]);
       light = woven(light, stage.light(frame, moments[i + 1].truth.time_s));
       step();
     }
+    frame_files.write_depth(frame, light.left_depth_mm);
     video.write(recorded(light, options.camera, options.look, frame));
   }
   summary.draw_s = seconds_since(draw_start);

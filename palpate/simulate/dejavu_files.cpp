@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/mesh_files.h"
 
 namespace palpate {
 
@@ -55,6 +58,28 @@ StereoVideoWriter::StereoVideoWriter(StereoVideoWriter&&) noexcept = default;
 void StereoVideoWriter::write(const StereoFrame& frame) {
   files_->left.write(frame.left);
   files_->right.write(frame.right);
+}
+
+FrameFiles::FrameFiles(const std::filesystem::path& folder, const SimulatedFiles& wanted)
+    : folder_(folder), wanted_(wanted) {
+  if (wanted.surface) std::filesystem::create_directories(folder / "surface");
+  if (wanted.depth) std::filesystem::create_directories(folder / "depth");
+}
+
+void FrameFiles::write_surface(int frame, const Surface& organ) const {
+  if (wanted_.surface) write_ply(folder_ / "surface" / fmt::format("frame_{:04d}.ply", frame), organ);
+}
+
+void FrameFiles::write_depth(int frame, const cv::Mat& depth_mm) const {
+  if (!wanted_.depth) return;
+  cv::Mat hundredths(depth_mm.size(), CV_16U);
+  for (int y = 0; y < depth_mm.rows; ++y)
+    for (int x = 0; x < depth_mm.cols; ++x) {
+      const float depth = depth_mm.at<float>(y, x);
+      hundredths.at<ushort>(y, x) = std::isfinite(depth) ? cv::saturate_cast<ushort>(100 * depth) : ushort{0};
+    }
+  const std::filesystem::path file = folder_ / "depth" / fmt::format("left_{:04d}.png", frame);
+  if (!cv::imwrite(file.string(), hundredths)) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
 }
 
 }  // namespace palpate

@@ -38,4 +38,20 @@ class StereoVideoWriter {
   std::unique_ptr<Files> files_;
 };
 
+/// What `simulate.write` asks for, one file per frame; without effect where it asks for nothing.
+class FrameFiles {
+ public:
+  FrameFiles(const std::filesystem::path& folder, const SimulatedFiles& wanted);
+
+  /// surface/frame_0000.ply: binary PLY, left camera frame, mm.
+  void write_surface(int frame, const Surface& organ) const;
+  /// depth/left_0000.png: 16-bit, hundredths of a millimetre along the optical axis at pixel centres; 0 where there is
+  /// nothing, 65535 beyond 655.35 mm.
+  void write_depth(int frame, const cv::Mat& depth_mm) const;
+
+ private:
+  std::filesystem::path folder_;
+  SimulatedFiles wanted_;
+};
+
 }  // namespace palpate

@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-enum class Action { approach, grasp, move, hold, release };
+enum class Action { approach, grasp, push, move, hold, release };
 
 const double kJaws_s = 0.16;        // time in which the jaws open or close
 const double kSameMoment_s = 1e-9;  // times of frames and rows agree up to rounding
@@ -21,6 +21,7 @@ std::vector<Action> actions_of(const GestureRow& row) {
   std::vector<Action> actions;
   if (row.approach_s > 0) actions.push_back(Action::approach);
   if (row.grasp) actions.push_back(Action::grasp);
+  if (row.push) actions.push_back(Action::push);
   if (row.during_s > 0) actions.push_back(Action::move);
   if (row.hold_s > 0) actions.push_back(Action::hold);
   if (row.release) actions.push_back(Action::release);
@@ -42,6 +43,7 @@ double duration_s(const GestureRow& row) {
     case Action::release:
       return row.leave_s;
     case Action::grasp:
+    case Action::push:
       return 0;
   }
   return 0;
@@ -68,13 +70,13 @@ void check_gesture(const std::vector<GestureRow>& rows) {
   const auto fail = [](size_t i, const std::string& what) {
     throw BadInput(fmt::format("simulate.gesture row {}: {}", i + 1, what));
   };
-  if (rows.empty()) throw BadInput("simulate.gesture: no rows; expected approach_s, grasp, moves, release");
+  if (rows.empty()) throw BadInput("simulate.gesture: no rows; expected approach_s, grasp or push, moves, release");
   bool approached = false, held = false, released = false;
   for (size_t i = 0; i < rows.size(); ++i) {
     const GestureRow& row = rows[i];
     const auto actions = actions_of(row);
     if (actions.size() != 1)
-      fail(i, fmt::format("{} of approach_s, grasp, during_s, hold_s, release are given; expected exactly one",
+      fail(i, fmt::format("{} of approach_s, grasp, push, during_s, hold_s, release are given; expected exactly one",
                           actions.size()));
     if (row.move_mm != Vec3::Zero() && actions[0] != Action::move) fail(i, "move_mm needs during_s");
     if (row.leave_s > 0 && !row.release) fail(i, "leave_s needs release: true");
@@ -84,14 +86,16 @@ void check_gesture(const std::vector<GestureRow>& rows) {
         approached = true;
         break;
       case Action::grasp:
-        if (!approached || held || released) fail(i, "grasp has to follow approach_s, once");
+      case Action::push:
+        if (!approached || held || released)
+          fail(i, fmt::format("{} has to follow approach_s, once", row.push ? "push" : "grasp"));
         held = true;
         break;
       case Action::move:
-        if (!held) fail(i, "during_s moves the tissue, so it has to stand between grasp and release");
+        if (!held) fail(i, "during_s moves the tissue, so it has to stand between grasp or push and release");
         break;
       case Action::release:
-        if (!held) fail(i, "release without a grasp before it");
+        if (!held) fail(i, "release without a grasp or push before it");
         held = false;
         released = true;
         break;
@@ -118,6 +122,16 @@ const GestureRow& approach_row(const std::vector<GestureRow>& rows) {
   throw std::invalid_argument("approach_row: the gesture has none");
 }
 
+bool is_push(const std::vector<GestureRow>& rows) {
+  return std::any_of(rows.begin(), rows.end(), [](const GestureRow& row) { return row.push; });
+}
+
+double longest_drag_mm(const std::vector<GestureRow>& rows) {
+  double longest = 0;
+  for (const GestureRow& row : rows) longest = std::max(longest, row.move_mm.tail<2>().norm());
+  return longest;
+}
+
 GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s) {
   GesturePose pose;
   pose.away = 1;
@@ -131,6 +145,7 @@ GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s) {
         pose.away = 1 - progress;
         break;
       case Action::grasp:
+      case Action::push:
         pose.in_contact = true;
         break;
       case Action::move:
@@ -145,6 +160,7 @@ GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s) {
     }
     start_s += length_s;
   }
+  if (is_push(rows)) return pose;
   const double closed_s = start_of(rows, Action::grasp);
   const double opened_s = start_of(rows, Action::release);
   pose.opening =

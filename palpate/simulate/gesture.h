@@ -11,11 +11,11 @@ struct GesturePose {
   bool in_contact = false;
   Vec3 move_mm = Vec3::Zero();  ///< from the contact point at rest: outward normal, tangents a and b
   double away = 0;              ///< distance back along the shaft, 0 = at the contact, 1 = where it begins and ends
-  double opening = 0;           ///< of the jaws, 0 closed .. 1 open
+  double opening = 0;           ///< of the jaws, 0 closed .. 1 open; a push keeps them closed
 };
 
-/// Throws BadInput, naming the row (counted from 1), unless the rows are: approach, grasp, moves, release, with holds
-/// in between, and each row is one action.
+/// Throws BadInput, naming the row (counted from 1), unless the rows are: approach, grasp or push, moves, release, with
+/// holds in between, and each row is one action.
 void check_gesture(const std::vector<GestureRow>& rows);
 
 /// Length of the whole gesture, s.
@@ -24,6 +24,12 @@ double gesture_duration_s(const std::vector<GestureRow>& rows);
 /// Pose at a time from the start. Minimum jerk within each row (rest to rest), so that positions, velocities and
 /// accelerations are continuous over row ends; the contact begins at its moment and ends just before the release.
 GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s);
+
+/// The tip is not tied to the tissue.
+bool is_push(const std::vector<GestureRow>& rows);
+
+/// How far along the tangents the moves go, at most.
+double longest_drag_mm(const std::vector<GestureRow>& rows);
 
 /// The row in which the tissue is approached.
 const GestureRow& approach_row(const std::vector<GestureRow>& rows);

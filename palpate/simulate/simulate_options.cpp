@@ -131,15 +131,28 @@ void describe_gesture_row(Settings& settings, GestureRow& row) {
   settings.pixel("at_px", row.at_px, "with approach_s: pixel of the left image at rest where the tissue is touched");
   settings.number("footprint_radius_mm", row.footprint_radius_mm, {0, 50},
                   "with approach_s: radius of the patch that the tip holds, 0 = as contact.footprint_radius_mm, mm");
-  settings.flag("grasp", row.grasp, "the contact begins");
+  settings.flag("grasp", row.grasp, "the contact begins; the tip holds the tissue whatever it does");
+  settings.flag("push", row.push,
+                "the contact begins; the tip presses and slides (contact.friction), and touches only while it is "
+                "below the surface at rest");
   settings.vector3(
       "move_mm", row.move_mm, {-100, 100},
-      "with during_s: where the tip goes, measured from where it grasped: outward normal n, tangent a (to the "
+      "with during_s: where the tip goes, measured from where it touched: outward normal n, tangent a (to the "
       "right in the image), tangent b (down), mm");
   settings.number("during_s", row.during_s, {0, 60}, "time of the move, s");
   settings.number("hold_s", row.hold_s, {0, 60}, "stay, s");
   settings.flag("release", row.release, "the contact ends");
   settings.number("leave_s", row.leave_s, {0, 60}, "with release: time in which the instrument goes away, s");
+}
+
+void describe_files(Settings& settings, SimulatedFiles& files) {
+  settings.flag("surface", files.surface, "surface/frame_0000.ply ...: the organ in each frame, left camera frame, mm");
+  settings.flag("depth", files.depth,
+                "depth/left_0000.png ...: what the left eye sees, 16 bit, in hundredths of a millimetre along the "
+                "optical axis, 0 = nothing");
+  settings.choice("grip", files.grip,
+                  {{"known", SimulatedFiles::Grip::known}, {"auto", SimulatedFiles::Grip::automatic}},
+                  "contact.grip of the scene.yaml that is written: that of the gesture, or left to the estimator");
 }
 
 }  // namespace
@@ -158,10 +171,12 @@ void describe(Settings& settings, SimulateOptions& options) {
   settings.list(
       "gesture",
       "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, grasp, "
-      "during_s, hold_s, release",
+      "push, during_s, hold_s, release",
       [&options] { return static_cast<int>(options.gesture.size()); },
       [&options](int count) { options.gesture.assign(static_cast<size_t>(count), GestureRow{}); },
       [&options](Settings& s, int i) { describe_gesture_row(s, options.gesture[static_cast<size_t>(i)]); });
+  settings.group("write", "what is written besides the recording and its truth",
+                 [&](Settings& s) { describe_files(s, options.write); });
   settings.after_reading([&options] { check_gesture(options.gesture); });
 }
 

@@ -76,12 +76,13 @@ struct SimulatedInstrument {
   double free_distance_mm = 48;          ///< how far from the contact the tip begins and ends, along the shaft
 };
 
-/// One row of `simulate.gesture`: exactly one of approach_s, grasp, during_s, hold_s, release.
+/// One row of `simulate.gesture`: exactly one of approach_s, grasp, push, during_s, hold_s, release.
 struct GestureRow {
   double approach_s = 0;
   cv::Point2d at_px;
   double footprint_radius_mm = 0;  ///< 0 = as contact.footprint_radius_mm
   bool grasp = false;
+  bool push = false;
   Vec3 move_mm = Vec3::Zero();
   double during_s = 0;
   double hold_s = 0;
@@ -95,6 +96,13 @@ struct SimulatedBreathing {
   double period_s = 4;
 };
 
+/// `simulate.write`: what is written besides the recording and its truth.
+struct SimulatedFiles {
+  bool surface = false;  ///< surface/frame_0000.ply ...: the organ as it is in each frame
+  bool depth = false;    ///< depth/left_0000.png ...: 16 bit, hundredths of a millimetre, 0 = nothing
+  enum class Grip { known, automatic } grip = Grip::known;  ///< what scene.yaml says to the estimator
+};
+
 /// `simulate` of the scene file.
 struct SimulateOptions {
   SimulatedBody body;
@@ -103,6 +111,7 @@ struct SimulateOptions {
   SimulatedInstrument instrument;
   SimulatedBreathing breathing;
   std::vector<GestureRow> gesture;
+  SimulatedFiles write;
 };
 
 /// Keys of the group `simulate`.

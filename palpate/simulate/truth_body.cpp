@@ -51,9 +51,9 @@ double area_moved_mm2(const TruthBody& body, const std::set<int>& tied) {
 
 TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
                           const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
-                          const Vec3& contact_normal, double radius_mm) {
+                          const Vec3& contact_normal, double radius_mm, double drag_mm) {
   TruthBody body;
-  const MeshFocus focus{contact_mm, kFocusRadii * radius_mm, kFocusEdgeRatio};
+  const MeshFocus focus{contact_mm, kFocusRadii * radius_mm + drag_mm, kFocusEdgeRatio};
   body.mesh = tetrahedralize(organ, elements, focus);
   body.boundary = boundary_triangles(body.mesh);
   body.fixed_nodes = select_attachments(body.mesh, attachments, project_px);

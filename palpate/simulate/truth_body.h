@@ -18,11 +18,12 @@ struct TruthBody {
 };
 
 /// Fills the closed organ with about `elements` tetrahedra, finer around `contact_mm`, so that the patch of `radius_mm`
-/// is well sampled. `project_px` as in select_attachments. Throws BadInput when the body cannot be filled,
-/// when attachments select nothing or everything, or when the patch lies on attached tissue.
+/// is well sampled, also where it is dragged to, `drag_mm` away. `project_px` as in select_attachments. Throws BadInput
+/// when the body cannot be filled, when attachments select nothing or everything, or when the patch lies on attached
+/// tissue.
 TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
                           const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
-                          const Vec3& contact_normal, double radius_mm);
+                          const Vec3& contact_normal, double radius_mm, double drag_mm = 0);
 
 /// A fine surface that rides on the boundary of a mesh: each point moves like the nearest point of the boundary.
 struct Skin {

@@ -4,10 +4,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <optional>
 
 #include "palpate/contact/equilibrium.h"
 #include "palpate/core/errors.h"
 #include "palpate/simulate/gesture.h"
+#include "palpate/simulate/pushed_tissue.h"
 #include "palpate/simulate/ray_scene.h"
 
 namespace palpate {
@@ -32,6 +34,29 @@ InstrumentPlace place_instrument(const SimulatedInstrument& instrument, const To
   }
   return place;
 }
+
+// Tissue that the tip holds whatever it does.
+class HeldTissue {
+ public:
+  HeldTissue(const TetModel& model, const TruthBody& body, const EquilibriumOptions& precision)
+      : body_(body), solver_(model, precision) {}
+
+  Equilibrium move(const Vec3& displacement_mm) {
+    if (!holding_) solver_.hold(body_.footprint);
+    holding_ = true;
+    return solver_.solve(displacement_mm);
+  }
+
+  void leave() {
+    if (holding_) solver_.release();
+    holding_ = false;
+  }
+
+ private:
+  const TruthBody& body_;
+  EquilibriumSolver solver_;
+  bool holding_ = false;
+};
 
 }  // namespace
 
@@ -64,15 +89,16 @@ TouchPoint find_touch_point(const Surface& organ, const SimulatedCamera& camera,
 }
 
 std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
-                                 const TouchPoint& touch, int frames, MotionQuality& quality,
+                                 const TouchPoint& touch, double friction, int frames, MotionQuality& quality,
                                  const std::function<void()>& step) {
   const TetModel model(truth.mesh, tissue, truth.fixed_nodes, Element::averaged);
   EquilibriumOptions precise;
   precise.relative_residual = kTruthResidual;
-  EquilibriumSolver solver(model, precise);
+  HeldTissue grasped(model, truth, precise);
+  PushedTissue pushed(model, truth, touch, friction, precise);
+  const bool push = is_push(options.gesture);
   const int fields = options.look.interlace ? 2 : 1;
   std::vector<Moment> moments;
-  bool holding = false;
   for (int field = 0; field < fields * frames; ++field) {
     Moment moment;
     TruthRow& row = moment.truth;
@@ -81,26 +107,32 @@ std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOpt
     const GesturePose pose = gesture_at(options.gesture, row.time_s);
     moment.breath_mm = breath_mm(options.breathing, row.time_s);
     moment.place = place_instrument(options.instrument, touch, pose, moment.breath_mm);
-    row.in_contact = pose.in_contact;
     row.tip_mm = moment.place.tip_mm;
     row.visible = row.tip_mm.z() > 0 && inside(options.camera, project(options.camera, row.tip_mm, 0)) &&
                   inside(options.camera, project(options.camera, row.tip_mm, options.camera.baseline_mm));
-    if (pose.in_contact) {
-      if (!holding) solver.hold(truth.footprint);
-      Equilibrium equilibrium = solver.solve(touch.axes * pose.move_mm);
-      if (!equilibrium.converged)
+    const Vec3 move_mm = touch.axes * pose.move_mm;
+    std::optional<Equilibrium> equilibrium;
+    if (!pose.in_contact) {
+      grasped.leave();
+      pushed.leave();
+    } else if (push) {
+      if (PushedTissue::Answer answer = pushed.move(move_mm); answer.touching)
+        equilibrium = std::move(answer.equilibrium);
+    } else {
+      equilibrium = grasped.move(move_mm);
+    }
+    row.in_contact = equilibrium.has_value();
+    if (equilibrium) {
+      if (!equilibrium->converged)
         throw BadInput(
             fmt::format("simulate.gesture: at {:.2f} s, moved by [{:.2f}, {:.2f}, {:.2f}] mm, the tissue has no "
                         "equilibrium; move it less or choose another law",
                         row.time_s, pose.move_mm.x(), pose.move_mm.y(), pose.move_mm.z()));
-      row.force_N = equilibrium.force_N;
-      quality.largest_residual = std::max(quality.largest_residual, equilibrium.residual);
-      quality.smallest_volume_ratio = std::min(quality.smallest_volume_ratio, equilibrium.smallest_volume_ratio);
-      moment.u = std::move(equilibrium.u);
-    } else if (holding) {
-      solver.release();
+      row.force_N = equilibrium->force_N;
+      quality.largest_residual = std::max(quality.largest_residual, equilibrium->residual);
+      quality.smallest_volume_ratio = std::min(quality.smallest_volume_ratio, equilibrium->smallest_volume_ratio);
+      moment.u = std::move(equilibrium->u);
     }
-    holding = pose.in_contact;
     moments.push_back(std::move(moment));
     step();
   }

@@ -35,10 +35,10 @@ struct MotionQuality {
 };
 
 /// The moments of `frames` frames, or of twice as many fields when the pictures are interlaced (field 2 k belongs to
-/// frame k, field 2 k + 1 is half a frame later). `step` is called after every moment. Throws BadInput when the tissue
-/// finds no equilibrium.
+/// frame k, field 2 k + 1 is half a frame later). `friction` is that of a push. `step` is called after every moment.
+/// Throws BadInput when the tissue finds no equilibrium.
 std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
-                                 const TouchPoint& touch, int frames, MotionQuality& quality,
+                                 const TouchPoint& touch, double friction, int frames, MotionQuality& quality,
                                  const std::function<void()>& step);
 
 /// Pixel of an eye at (eye_x_mm, 0, 0), parallel to the left one, without distortion.

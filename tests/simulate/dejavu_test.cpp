@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <unistd.h>
+#include <yaml-cpp/yaml.h>
 
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <sstream>
@@ -12,6 +15,7 @@
 #include "palpate/simulate/organ_shape.h"
 #include "palpate/simulate/uterus_demo.h"
 #include "palpate/stereo/rig.h"
+#include "palpate/volume/body.h"
 
 namespace palpate {
 namespace {
@@ -23,6 +27,14 @@ SimulatedCase small_case() {
   demo.simulate.body.elements = 900;
   for (GestureRow& row : demo.simulate.gesture) row.at_px *= 0.25;
   return demo;
+}
+
+std::vector<GestureRow> read_gesture(const std::string& rows) {
+  SimulateOptions options;
+  Settings settings;
+  describe(settings, options);
+  read_settings(YAML::Load("gesture: " + rows), {"scene.yaml", "/"}, settings, "simulate.");
+  return options.gesture;
 }
 
 struct Row {
@@ -58,7 +70,8 @@ class DejaVu : public ::testing::Test {
   static void SetUpTestSuite() {
     folder = std::filesystem::path(::testing::TempDir()) / ("palpate_dejavu_" + std::to_string(getpid()));
     std::filesystem::remove_all(folder);
-    const SimulatedCase demo = small_case();
+    SimulatedCase demo = small_case();
+    demo.simulate.write.surface = demo.simulate.write.depth = true;
     summary = simulate_dejavu(demo.simulate, demo.tissue, demo.attachments, demo.contact, folder,
                               [](int now, int all) { done = now, total = all; });
   }
@@ -156,6 +169,76 @@ TEST_F(DejaVu, OutlineCoversTheOrganInTheFirstPicture) {
   EXPECT_NEAR(cv::contourArea(polygon) / cv::contourArea(hull), 1, 0.05);
   EXPECT_GT(summary.thickness_mm, 40);
   EXPECT_LT(summary.thickness_mm, 62);
+}
+
+// The organ that the files tell of is where its depth is seen, but for where the instrument stands before it.
+TEST_F(DejaVu, WritesSurfaceAndDepthOfEveryFrameThatAgree) {
+  for (int frame = 0; frame < summary.frames; ++frame) {
+    const auto name = [&](const char* pattern) { return (folder / cv::format(pattern, frame)).string(); };
+    const Surface organ = read_body(name("surface/frame_%04d.ply"), LengthUnit::mm);
+    const cv::Mat depth = cv::imread(name("depth/left_%04d.png"), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(depth.type(), CV_16U);
+    ASSERT_EQ(depth.size(), cv::Size(240, 136));
+    const std::vector<Vec3> normals = vertex_normals(organ.vertices_mm, organ.triangles);
+    int seen = 0, hidden = 0;
+    for (size_t i = 0; i < organ.vertices_mm.size(); ++i) {
+      const Vec3& p = organ.vertices_mm[i];
+      if (normals[i].dot(-p.normalized()) < 0.5) continue;
+      const auto x = static_cast<int>(std::lround(175 * p.x() / p.z() + 119.5));
+      const auto y = static_cast<int>(std::lround(175 * p.y() / p.z() + 67.5));
+      const double seen_mm = depth.at<ushort>(y, x) / 100.0;
+      ASSERT_LT(seen_mm, p.z() + 1.0) << "frame " << frame;  // a pixel is 0.6 mm wide
+      seen += seen_mm > p.z() - 1.0;
+      hidden += seen_mm <= p.z() - 1.0;
+    }
+    EXPECT_GT(seen, 1000);
+    EXPECT_LT(hidden, seen / 4) << "frame " << frame;
+  }
+}
+
+// A probe presses, slides to the side, lifts and leaves, while the scene breathes; with all that a bad day brings.
+TEST(DejaVuPush, IsInContactOnlyWhileItPressesAndLooksTheSameInTheFilesForAnyNumberOfThreads) {
+  SimulatedCase demo = small_case();
+  demo.simulate.gesture = read_gesture(R"([{approach_s: 0.4, at_px: [102, 49], footprint_radius_mm: 4}, {push: true},
+    {move_mm: [-1.2, 0, 0], during_s: 0.4}, {move_mm: [-1.2, 3, 0], during_s: 0.4}, {move_mm: [1, 3, 0], during_s: 0.6},
+    {release: true, leave_s: 0.2}])");
+  demo.simulate.look.smoke.density = 0.2;
+  demo.simulate.look.interlace = true;
+  demo.simulate.breathing = {{0, 2, 1}, 2};
+  demo.simulate.write.surface = demo.simulate.write.depth = true;
+  demo.simulate.write.grip = SimulatedFiles::Grip::automatic;
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("palpate_push_" + std::to_string(getpid()));
+  std::vector<std::vector<std::string>> written;
+  for (const size_t threads : {1, 3}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const DejaVuSummary summary = simulate_dejavu(demo.simulate, demo.tissue, demo.attachments, demo.contact, folder);
+    EXPECT_EQ(summary.grip, Grip::automatic);
+    EXPECT_GT(summary.peak_force_N, 1);
+    std::vector<std::string> files;
+    for (const char* name : {"truth.csv", "depth/left_0004.png", "surface/frame_0005.ply"}) {
+      std::ifstream in(folder / name, std::ios::binary);
+      files.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    }
+    written.push_back(files);
+    bool pressed = false;
+    for (const Row& row : read_truth(folder / "truth.csv")) {
+      const GesturePose pose = gesture_at(demo.simulate.gesture, row.time_s);
+      if (pose.move_mm.x() > 0.3) {
+        EXPECT_EQ(row.in_contact, 0) << row.frame;
+      }
+      if (pose.move_mm.x() < -0.3) {
+        EXPECT_EQ(row.in_contact, 1) << row.frame;
+      }
+      if (row.in_contact == 1) {
+        EXPECT_LE(row.force.dot(summary.contact_normal), 0);
+      }
+      pressed = pressed || pose.move_mm.x() < -1;
+    }
+    EXPECT_TRUE(pressed);
+    std::filesystem::remove_all(folder);
+  }
+  EXPECT_EQ(written[0][0], written[1][0]);
+  EXPECT_TRUE(written[0] == written[1]);  // what is drawn is compared before it is encoded, by the tests of Renderer
 }
 
 TEST(DejaVuSettings, RefuseAGestureThatMissesTheOrganAndWriteNothing) {

@@ -98,12 +98,25 @@ TEST(GestureKeys, RefuseWhatIsNotAGesture) {
   EXPECT_THAT(complaint("gesture: [{approach_s: 1, at_px: [1, 1]}, {hold_s: 1, grasp: true}]"),
               HasSubstr("row 2: 2 of approach_s"));
   EXPECT_THAT(complaint("gesture: [{approach_s: 1, at_px: [1, 1]}, {move_mm: [1, 0, 0], during_s: 1}]"),
-              HasSubstr("between grasp and release"));
+              HasSubstr("between grasp or push and release"));
   EXPECT_THAT(complaint("gesture: [{approach_s: 1, at_px: [1, 1]}, {move_mm: [1, 0, 0]}]"), HasSubstr("row 2"));
   EXPECT_THAT(complaint("gesture: [{approach_s: 1, at_px: [1, 1]}, {release: true}]"),
-              HasSubstr("release without a grasp"));
+              HasSubstr("release without a grasp or push"));
   EXPECT_THAT(complaint("gesture: [{hold_s: 1}]"), HasSubstr("approach_s"));
   EXPECT_THAT(complaint("gesture: [{aproach_s: 1}]"), HasSubstr("approach_s"));
+}
+
+TEST(Gesture, OfAPushKeepsTheJawsClosedAndIsOneContact) {
+  const std::string push =
+      "gesture: [{approach_s: 1, at_px: [1, 1]}, {push: true}, {move_mm: [-1, 3, 4], during_s: 1}, {release: true}]";
+  const auto rows = read(push).gesture;
+  EXPECT_TRUE(is_push(rows));
+  EXPECT_FALSE(is_push(read(kGesture).gesture));
+  EXPECT_DOUBLE_EQ(longest_drag_mm(rows), 5);
+  EXPECT_TRUE(gesture_at(rows, 1.5).in_contact);
+  for (const double t : {0.1, 1.0, 1.9, 2.0}) EXPECT_EQ(gesture_at(rows, t).opening, 0);
+  EXPECT_THAT(complaint("gesture: [{approach_s: 1, at_px: [1, 1]}, {grasp: true}, {push: true}]"),
+              HasSubstr("row 3: push has to follow approach_s, once"));
 }
 
 TEST(SimulateKeys, TakeAShapeByWordOrByFile) {

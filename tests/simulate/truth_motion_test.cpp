@@ -27,7 +27,7 @@ struct SmallCase {
   std::vector<Moment> solve(double fps, int frames) {
     demo.simulate.camera.fps = fps;
     MotionQuality quality;
-    const auto moments = solve_motion(demo.simulate, demo.tissue, truth, touch, frames, quality, [] {});
+    const auto moments = solve_motion(demo.simulate, demo.tissue, truth, touch, 0.3, frames, quality, [] {});
     EXPECT_LE(quality.largest_residual, 1e-8);
     return moments;
   }
