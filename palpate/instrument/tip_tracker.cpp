@@ -188,12 +188,17 @@ void TipTracker::State::advance(const std::optional<RigidMotion>& measured, bool
   } else if (detection && corrected()) {
     rejected = 0;
   } else if (detection) {
-    // Motion and detection contradict each other: the one that continues the path so far is right; a marked template,
-    // which the contact hangs on, has proved itself.
+    // Motion and detection contradict each other: the one that continues the path so far is right, or comes nearer to
+    // it; a marked template, which the contact hangs on, has proved itself.
     const TipFilter as_followed = filter;
     filter = before;
     filter.predict(seconds);
-    if (followed && !marked && corrected()) {
+    const Vec3 predicted_mm = filter.position_mm();
+    const bool is_nearer =
+        (detection->tip_mm - predicted_mm).norm() < (as_followed.position_mm() - predicted_mm).norm();
+    const bool continues = corrected();
+    if (followed && !marked && (continues || is_nearer)) {
+      if (!continues) filter.start(detection->tip_mm, detection->covariance_mm2);
       taken.reset();
       rejected = 0;
     } else {
