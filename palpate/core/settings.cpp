@@ -199,6 +199,18 @@ void Settings::text(const std::string& key, std::string& field, const std::strin
   entries_.push_back(std::move(entry));
 }
 
+namespace {
+
+std::string expanded_at(const std::string& place, const YAML::Node& node) {
+  try {
+    return expand_environment(node.Scalar());
+  } catch (const BadInput& error) {
+    throw BadInput(fmt::format("{}: {}", place, error.what()));
+  }
+}
+
+}  // namespace
+
 void Settings::path(const std::string& key, std::filesystem::path& field, const std::string& doc) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;
@@ -208,13 +220,7 @@ void Settings::path(const std::string& key, std::filesystem::path& field, const 
                          const std::string&) {
     if (!node.IsScalar() || node.Scalar().empty())
       throw BadInput(fmt::format("{} is {}, expected a path", place, written(node)));
-    const std::string expanded = [&] {
-      try {
-        return expand_environment(node.Scalar());
-      } catch (const BadInput& error) {
-        throw BadInput(fmt::format("{}: {}", place, error.what()));
-      }
-    }();
+    const std::string expanded = expanded_at(place, node);
     // A device number or a GStreamer pipeline is no file name.
     const bool is_device = expanded.find_first_not_of("0123456789") == std::string::npos;
     const bool is_pipeline = expanded.find(" ! ") != std::string::npos;
@@ -299,24 +305,32 @@ void Settings::polygon(const std::string& key, std::vector<cv::Point2d>& field, 
 
 void Settings::choice_by_index(const std::string& key, const std::vector<std::string>& names,
                                const std::function<int()>& get, const std::function<void(int)>& set,
-                               const std::string& doc) {
+                               const std::string& doc, const std::string& extension, std::filesystem::path* file) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;
   entry->doc = doc;
-  entry->range = fmt::format("{}", fmt::join(names, ", "));
-  entry->read = [names, set](const YAML::Node& node, const SettingsContext&, const std::string& place,
-                             const std::string&) {
+  entry->range = fmt::format("{}{}", fmt::join(names, ", "), file ? ", or a file *" + extension : "");
+  entry->read = [names, set, extension, file](const YAML::Node& node, const SettingsContext& context,
+                                              const std::string& place, const std::string&) {
     const std::string word = node.IsScalar() ? node.Scalar() : "";
+    if (file && word.ends_with(extension)) {
+      *file = (context.folder / expanded_at(place, node)).lexically_normal();
+      set(static_cast<int>(names.size()));
+      return;
+    }
     const auto found = std::find(names.begin(), names.end(), word);
     if (found == names.end()) {
       const std::string nearest = nearest_word(word, names);
-      throw BadInput(fmt::format("{} is {}{}, expected one of: {}{}", place, written(node),
-                                 word.ends_with(".onnx") ? "; networks are not available yet in this version" : "",
-                                 fmt::join(names, ", "), nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+      throw BadInput(fmt::format("{} is {}, expected one of: {}{}{}", place, written(node), fmt::join(names, ", "),
+                                 file ? ", or a file *" + extension : "",
+                                 nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
     }
     set(static_cast<int>(found - names.begin()));
   };
-  entry->write = [names, get] { return names[static_cast<size_t>(get())]; };
+  entry->write = [names, get, file] {
+    const auto index = static_cast<size_t>(get());
+    return index < names.size() ? names[index] : yaml_text(file->string());
+  };
   entry->default_text = entry->write();
   entries_.push_back(std::move(entry));
 }

@@ -76,6 +76,25 @@ class Settings {
         [&field, words](int index) { field = words[static_cast<size_t>(index)].second; }, doc);
   }
 
+  /// One word out of a list, or a file whose name ends with `extension`, for which `of_file` stands.
+  template <class Enum>
+  void choice_or_file(const std::string& key, Enum& field, const std::vector<std::pair<std::string, Enum>>& words,
+                      Enum of_file, const std::string& extension, std::filesystem::path& file, const std::string& doc) {
+    std::vector<std::string> names;
+    for (const auto& word : words) names.push_back(word.first);
+    choice_by_index(
+        key, names,
+        [&field, words] {
+          size_t index = 0;
+          while (index < words.size() && words[index].second != field) ++index;
+          return static_cast<int>(index);
+        },
+        [&field, words, of_file](int index) {
+          field = index < static_cast<int>(words.size()) ? words[static_cast<size_t>(index)].second : of_file;
+        },
+        doc, extension, &file);
+  }
+
   /// A nested group. `present`, if given, becomes true when the key stands in the file; when it is false on writing,
   /// the group is left out.
   void group(const std::string& key, const std::string& doc, const std::function<void(Settings&)>& describe_group,
@@ -100,8 +119,10 @@ class Settings {
   friend std::string write_settings(const Settings&);
   friend std::string document_settings(const Settings&, const std::string&);
 
+  /// The index after the last name stands for `file`, where there is one.
   void choice_by_index(const std::string& key, const std::vector<std::string>& names, const std::function<int()>& get,
-                       const std::function<void(int)>& set, const std::string& doc);
+                       const std::function<void(int)>& set, const std::string& doc, const std::string& extension = "",
+                       std::filesystem::path* file = nullptr);
 
   struct Entry;
   std::vector<std::unique_ptr<Entry>> entries_;

@@ -94,9 +94,11 @@ void take_over(const Seeds& seeds, DisparityMap& map) {
 }  // namespace
 
 void describe(Settings& settings, MatchOptions& options) {
-  settings.choice<Matcher>("matcher", options.matcher,
-                           {{"quasi-dense", Matcher::quasi_dense}, {"sgbm", Matcher::sgbm}, {"dis", Matcher::dis}},
-                           "how left and right are matched");
+  settings.choice_or_file<Matcher>(
+      "matcher", options.matcher,
+      {{"quasi-dense", Matcher::quasi_dense}, {"sgbm", Matcher::sgbm}, {"dis", Matcher::dis}}, Matcher::network,
+      ".onnx", options.network,
+      "how left and right are matched; a file: learned network, inputs left and right, output disparity");
   settings.number("nearest_mm", options.nearest_mm, {1, 10000, false, false}, "closest depth searched");
   settings.number("farthest_mm", options.farthest_mm, {1, 100000, false, false}, "farthest depth searched");
   settings.after_reading([&options] {

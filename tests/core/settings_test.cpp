@@ -130,9 +130,21 @@ TEST(Settings, AKeyOfALaterVersionIsRefusedAsSuch) {
             "folder/scene.yaml:2: ripeness is not available yet in this version");
   EXPECT_EQ(complaint("basket: [{label: a}, {label: b}]\n"),
             "folder/scene.yaml:1: basket[1] is not available yet in this version");
-  EXPECT_EQ(complaint("fruit: pear.onnx\n"),
-            "folder/scene.yaml:1: fruit is 'pear.onnx'; networks are not available yet in this version, expected one "
-            "of: apple, pear");
+}
+
+TEST(Settings, AWordOrAFileIsReadFromTheSettingsFolderAndWrittenBack) {
+  enum class Way { walk, ride, map };
+  Way way = Way::walk;
+  std::filesystem::path file;
+  Settings settings;
+  settings.choice_or_file<Way>("way", way, {{"walk", Way::walk}, {"ride", Way::ride}}, Way::map, ".onnx", file, "");
+  read_settings(YAML::Load("way: here/north.onnx"), {"folder/scene.yaml", "folder"}, settings, "");
+  EXPECT_EQ(way, Way::map);
+  EXPECT_EQ(file, "folder/here/north.onnx");
+  EXPECT_EQ(YAML::Load(write_settings(settings))["way"].as<std::string>(), "folder/here/north.onnx");
+  read_settings(YAML::Load("way: ride"), {"folder/scene.yaml", "folder"}, settings, "");
+  EXPECT_EQ(way, Way::ride);
+  EXPECT_THROW(read_settings(YAML::Load("way: north.png"), {"folder/scene.yaml", "folder"}, settings, ""), BadInput);
 }
 
 TEST(Settings, ASentenceOfAGroupNamesTheGroupOnce) {
