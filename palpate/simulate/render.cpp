@@ -12,6 +12,7 @@
 #include "palpate/simulate/baked_texture.h"
 #include "palpate/simulate/noise.h"
 #include "palpate/simulate/ray_scene.h"
+#include "palpate/simulate/shading.h"
 
 namespace palpate {
 namespace {
@@ -48,22 +49,6 @@ struct Lit {
 bool belong_together(const Sample& a, const Sample& b) {
   return a.surface == b.surface &&
          (a.surface < 0 || std::abs(a.depth_mm - b.depth_mm) < kSameDepth * std::min(a.depth_mm, b.depth_mm));
-}
-
-// Outgoing over incoming light of the specular lobe, times pi and the cosine at the light, so that it adds to an
-// albedo.
-float specular(const Vec3f& n, const Vec3f& to_light, const Vec3f& to_eye, float alpha, float reflectance) {
-  const float n_l = n.dot(to_light), n_v = std::max(1e-3f, n.dot(to_eye));
-  if (n_l <= 0) return 0;
-  const Vec3f half = (to_light + to_eye).normalized();
-  const float n_h = std::max(0.0f, n.dot(half)), v_h = std::max(0.0f, to_eye.dot(half));
-  const float a2 = alpha * alpha;
-  const float d = n_h * n_h * (a2 - 1) + 1;
-  const float distribution = a2 / (d * d);
-  const auto masking = [a2](float c) { return 2 * c / (c + std::sqrt(a2 + (1 - a2) * c * c)); };
-  const float m = 1 - v_h;
-  const float fresnel = reflectance + (1 - reflectance) * m * m * m * m * m;
-  return distribution * masking(n_l) * masking(n_v) * fresnel / (4 * n_v);
 }
 
 }  // namespace

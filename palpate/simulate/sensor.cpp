@@ -43,6 +43,12 @@ float normal_from(uint32_t bits) {
 
 }  // namespace
 
+float light_from_level(float level) {
+  const float s = std::clamp(level / 255, 0.0f, 0.998f);
+  const float light = s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
+  return light <= kShoulder ? light : kShoulder - (1 - kShoulder) * std::log((1 - light) / (1 - kShoulder));
+}
+
 cv::Mat sensor_image(const cv::Mat& linear_bgr, const SimulatedNoise& noise, uint32_t seed) {
   const auto table = level_table();
   const float read2 = static_cast<float>(noise.read_levels * noise.read_levels);

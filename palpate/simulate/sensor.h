@@ -10,4 +10,7 @@ namespace palpate {
 /// read and shot noise. The noise of a pixel depends on its place and the seed only.
 cv::Mat sensor_image(const cv::Mat& linear_bgr, const SimulatedNoise& noise, uint32_t seed);
 
+/// The light that a level 0..255 stands for, without noise: the inverse of the sensor's curve.
+float light_from_level(float level);
+
 }  // namespace palpate

@@ -56,6 +56,16 @@ void describe_noise(Settings& settings, SimulatedNoise& noise) {
                   "what is added at white, of 255 levels; its variance grows with the level");
 }
 
+void describe_texture_source(Settings& settings, TextureSource& source) {
+  settings.path("image", source.image, "left image as recorded, without instrument");
+  settings.path("surface", source.surface, "surface that it shows, such as the surface.ply of palpate map, mm");
+  settings.path("calibration", source.calibration, "of the cameras, as recording.calibration");
+  settings.after_reading([&source] {
+    if (source.image.empty() != source.surface.empty() || source.image.empty() != source.calibration.empty())
+      throw BadInput("simulate.look.texture_from: needs image, surface and calibration, all three");
+  });
+}
+
 void describe_border(Settings& settings, SimulatedBorder& border) {
   settings.number("radius_px", border.radius_px, {0, 10000},
                   "radius of the round field of view around the middle of the image, 0 = none, px");
@@ -77,8 +87,13 @@ void describe_look(Settings& settings, SimulatedLook& look) {
   settings.path("texture", look.texture, "procedural, or an image of tissue that is laid on from three sides");
   settings.number("texture_mm_per_px", look.texture_mm_per_px, {0, 10, true},
                   "size of one pixel of that image on the tissue, mm");
+  settings.group("texture_from",
+                 "a picture of tissue whose light, gloss and albedo are estimated, to be used instead of texture, "
+                 "light.position_mm, roughness and reflectance",
+                 [&look](Settings& s) { describe_texture_source(s, look.texture_from); });
   settings.integer("seed", look.seed, {0, 1e9}, "of the procedural texture and of the noise");
   settings.number("roughness", look.roughness, {0.05, 1}, "of the wet surface; smaller makes sharper highlights");
+  settings.number("reflectance", look.reflectance, {0, 1}, "of the wet surface at normal incidence");
   settings.number("exposure", look.exposure, {0, 100, true}, "factor on the brightness");
   settings.group("light", "the light of the scope; brightness falls with the square of the distance",
                  [&look](Settings& s) { describe_light(s, look.light); });

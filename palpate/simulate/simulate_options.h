@@ -28,6 +28,13 @@ struct SimulatedNoise {
   double shot_levels = 1.2;  ///< additional standard deviation at white; its variance grows with the level
 };
 
+/// A picture of real tissue, with the surface that it shows, to take the look from; empty = none.
+struct TextureSource {
+  std::filesystem::path image;        ///< left image as recorded
+  std::filesystem::path surface;      ///< what it shows, left camera frame, mm
+  std::filesystem::path calibration;  ///< as recording.calibration
+};
+
 /// Edge of the scope's round field of view, in the middle of the image.
 struct SimulatedBorder {
   double radius_px = 0;  ///< 0 = the whole image is seen
@@ -48,8 +55,10 @@ struct SimulatedBlood {
 struct SimulatedLook {
   std::filesystem::path texture = "procedural";  ///< procedural, or an image laid on from three sides
   double texture_mm_per_px = 0.12;               ///< size of a pixel of that image on the tissue
+  TextureSource texture_from;                    ///< replaces texture, light.position_mm, roughness and reflectance
   int seed = 1;
-  double roughness = 0.36;  ///< of the wet surface
+  double roughness = 0.36;    ///< of the wet surface
+  double reflectance = 0.04;  ///< of the wet surface at normal incidence
   double exposure = 0.85;
   SimulatedLight light;
   SimulatedNoise noise;

@@ -1,6 +1,14 @@
 #include "palpate/simulate/stage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "palpate/core/errors.h"
+#include "palpate/simulate/estimate_look.h"
+#include "palpate/volume/polygon_soup.h"
 
 namespace palpate {
 namespace {
@@ -30,6 +38,34 @@ Surface make_wall(const SimulatedCamera& camera, const Surface& organ) {
   return wall;
 }
 
+// A part of the picture that shows the surface nearly everywhere, so that little is filled in.
+cv::Rect well_seen(const cv::Mat& seen) {
+  cv::Rect part = cv::boundingRect(seen);
+  while (part.width > 64 && part.height > 64 && cv::countNonZero(seen(part)) < 0.97 * part.area()) {
+    const int dx = std::max(1, part.width / 40), dy = std::max(1, part.height / 40);
+    part = {part.x + dx, part.y + dy, part.width - 2 * dx, part.height - 2 * dy};
+  }
+  return part;
+}
+
+// The texture of the organ; where a picture is given, its light and gloss become those of `options`.
+Texture take_look(SimulateOptions& options) {
+  SimulatedLook& look = options.look;
+  const TextureSource& source = look.texture_from;
+  if (source.image.empty()) return tissue_texture(look);
+  const cv::Mat image = cv::imread(source.image.string(), cv::IMREAD_COLOR);
+  if (image.empty())
+    throw BadInput(
+        fmt::format("simulate.look.texture_from.image: {} is not an image that can be read", source.image.string()));
+  const StereoRig rig = read_rig(source.calibration);
+  check_rig_fits(rig, image.size());
+  const EstimatedLook found = estimate_look(image, rig.left, read_polygon_soup(source.surface), look);
+  look.light.position_mm = found.light_mm - Vec3(options.camera.baseline_mm / 2, 0, 0);
+  look.roughness = found.roughness;
+  look.reflectance = found.reflectance;
+  return image_texture(found.albedo(well_seen(found.seen)).clone(), found.mm_per_px, look.seed);
+}
+
 std::vector<Vec3> moved_by(std::vector<Vec3> points_mm, const Vec3& by_mm) {
   for (Vec3& point : points_mm) point += by_mm;
   return points_mm;
@@ -40,15 +76,16 @@ std::vector<Vec3> moved_by(std::vector<Vec3> points_mm, const Vec3& by_mm) {
 Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth,
              const InstrumentPlace& first_place)
     : options_(options),
+      tissue_(take_look(options_)),
       organ_(organ),
       wall_(make_wall(options.camera, organ)),
       shown_organ_(organ),
       skin_(attach_skin(organ.vertices_mm, truth.mesh.nodes_mm, truth.boundary)),
-      renderer_(options.camera, options.look) {
+      renderer_(options_.camera, options_.look) {
   const auto texels_per_mm = [&](double depth) { return std::min(8.0, options.camera.focal_px / depth); };
-  const SimulatedLook& look = options.look;
-  organ_number_ = renderer_.add(organ_, {bloody(tissue_texture(look), look.blood, look.seed),
-                                         texels_per_mm(organ_.vertices_mm[0].z()), look.roughness, 0.04});
+  const SimulatedLook& look = options_.look;
+  organ_number_ = renderer_.add(organ_, {bloody(tissue_, look.blood, look.seed),
+                                         texels_per_mm(organ_.vertices_mm[0].z()), look.roughness, look.reflectance});
   wall_number_ = renderer_.add(wall_, {wall_texture(look.seed), texels_per_mm(wall_.vertices_mm[0].z()), 0.6, 0.03});
   instrument_number_ =
       renderer_.add(make_instrument(options.instrument, first_place), {steel_texture(), 1, 0.55, 0.35});

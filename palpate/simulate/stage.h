@@ -8,7 +8,8 @@ namespace palpate {
 /// The three surfaces that are drawn: organ, the wall of the cavity behind it, instrument.
 class Stage {
  public:
-  /// `organ` at rest; the instrument in `first_place`.
+  /// `organ` at rest; the instrument in `first_place`. Throws BadInput when a picture that the look is taken from
+  /// cannot be read.
   Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth,
         const InstrumentPlace& first_place);
 
@@ -24,6 +25,7 @@ class Stage {
 
  private:
   SimulateOptions options_;
+  Texture tissue_;
   Surface organ_, wall_, shown_organ_;
   Skin skin_;
   Renderer renderer_;

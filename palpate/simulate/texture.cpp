@@ -67,10 +67,7 @@ Texture procedural_tissue(uint32_t seed) {
 // The image repeated by mirroring, laid on along the three axes of the camera and blended by the normal.
 class TriplanarImage {
  public:
-  TriplanarImage(const cv::Mat& bgr, double mm_per_px) : mm_per_px_(mm_per_px) {
-    bgr.convertTo(linear_, CV_32FC3, 1 / 255.0);
-    cv::pow(linear_, 2.2, linear_);
-  }
+  TriplanarImage(const cv::Mat& linear_bgr, double mm_per_px) : mm_per_px_(mm_per_px), linear_(linear_bgr) {}
 
   Colour at(const Vec3& p, const Vec3& normal) const {
     const Vec3 weight = normal.array().abs().pow(4);
@@ -105,18 +102,25 @@ class TriplanarImage {
 
 }  // namespace
 
+Texture image_texture(const cv::Mat& linear_bgr, double mm_per_px, int seed) {
+  return [map = TriplanarImage(linear_bgr, mm_per_px), bumps = procedural_tissue(1000u * static_cast<uint32_t>(seed))](
+             const Vec3& rest_mm, const Vec3& normal) {
+    Texel texel = bumps(rest_mm, normal);
+    texel.albedo = map.at(rest_mm, normal);
+    return texel;
+  };
+}
+
 Texture tissue_texture(const SimulatedLook& look) {
   const auto seed = 1000u * static_cast<uint32_t>(look.seed);
   if (look.texture == "procedural") return procedural_tissue(seed);
   const cv::Mat image = cv::imread(look.texture.string(), cv::IMREAD_COLOR);
   if (image.empty())
     throw BadInput(fmt::format("simulate.look.texture: {} is not an image that can be read", look.texture.string()));
-  return [map = TriplanarImage(image, look.texture_mm_per_px), bumps = procedural_tissue(seed)](const Vec3& rest_mm,
-                                                                                                const Vec3& normal) {
-    Texel texel = bumps(rest_mm, normal);
-    texel.albedo = map.at(rest_mm, normal);
-    return texel;
-  };
+  cv::Mat linear;
+  image.convertTo(linear, CV_32FC3, 1 / 255.0);
+  cv::pow(linear, 2.2, linear);
+  return image_texture(linear, look.texture_mm_per_px, look.seed);
 }
 
 Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed_number) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <opencv2/core.hpp>
 
 #include "palpate/simulate/simulate_options.h"
 
@@ -19,6 +20,10 @@ using Texture = std::function<Texel(const Vec3& rest_mm, const Vec3& normal)>;
 /// Organ: mottled red tissue with vessels, a little fat and fine grain, or the image that the options name, laid on
 /// from three sides. Throws BadInput when the image cannot be read.
 Texture tissue_texture(const SimulatedLook& look);
+
+/// Tissue with the albedo of a linear BGR image (CV_32FC3) laid on from three sides, and the relief of the procedural
+/// one.
+Texture image_texture(const cv::Mat& linear_bgr, double mm_per_px, int seed);
 
 /// The same with patches of blood: dark, with less relief, their share of space as told.
 Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed);
