@@ -25,9 +25,9 @@ const int kMostSamples = 40000;
 // Deviation of the light's place from the camera that is expected: it shines from the tip of the scope. How far in
 // front it stands and how bright tissue is look nearly the same.
 const Eigen::Array3d kLightNear_mm(15, 15, 2);
-const double kOutlier = 0.35;         // of log albedo
-const float kLeastCosine = 0.15f;     // of light that grazes nothing is learned
-const float kSaturated = 2.0f;        // of light; such a pixel says only that it is bright
+const double kOutlier = 0.35;        // of log albedo
+const float kLeastCosine = 0.15f;    // of light that grazes nothing is learned
+const float kSaturated = 2.0f;       // of light; such a pixel says only that it is bright
 const float kHighlightShare = 0.3f;  // of a pixel's light, from where on it is filled in
 
 const float kDarkest = 0.003f, kBrightest = 0.9f;  // albedo
