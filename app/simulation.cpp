@@ -48,7 +48,7 @@ SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path&
   scene.map.organ_region_px = summary.organ_region_px;
   scene.map.thickness_mm = summary.thickness_mm;
   scene.contact.footprint_radius_mm = summary.contact_radius_mm;
-  scene.contact.grip = Grip::grasp;
+  scene.contact.grip = summary.grip;
   std::ofstream stream(estimated.file);
   stream << write_scene_file(estimated);
   if (!stream.flush()) throw Unfinished(estimated.file.string() + ": cannot be written");
