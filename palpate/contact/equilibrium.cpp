@@ -42,21 +42,27 @@ double largest_nodal_norm(const Eigen::VectorXd& v) {
 }  // namespace
 
 struct EquilibriumSolver::State {
+  /// The rows of J that belong to one contact.
+  struct Contact {
+    Eigen::SparseMatrix<double> J;
+    Eigen::VectorXd begin_mm;  // J u where it began
+  };
+
   const TetModel& model;
   EquilibriumOptions options;
-  Footprint footprint;
-  Eigen::SparseMatrix<double> J;
+  std::vector<Contact> contacts;
+  Eigen::SparseMatrix<double> J;  // of all contacts
   std::unique_ptr<BorderedSystem> system;
   Secants secants;
-  Eigen::VectorXd u;       // unknowns of the last equilibrium
-  Eigen::VectorXd lambda;  // its multipliers
-  Vec3 displacement_mm = Vec3::Zero();
+  Eigen::VectorXd u;                // unknowns of the last equilibrium
+  Eigen::VectorXd lambda;           // its multipliers
+  Eigen::VectorXd displacement_mm;  // of each contact in turn
   int iterations_left = 0;
 
   int solves_left = 0;
   struct Step {
     Eigen::VectorXd du;
-    Vec3 dp_mm = Vec3::Zero();
+    Eigen::VectorXd dp_mm;
   };
   Step last_step, earlier_step;
   bool balanced = true;  // u is an equilibrium, not just where the solves ran out
@@ -75,6 +81,38 @@ struct EquilibriumSolver::State {
   };
 
   State(const TetModel& m, const EquilibriumOptions& o) : model(m), options(o) {}
+
+  /// J u for the displacements `p` of the contacts.
+  Eigen::VectorXd target_of(const Eigen::VectorXd& p) const {
+    Eigen::VectorXd target(J.rows());
+    Eigen::Index row = 0;
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      const Eigen::Index rows = contacts[i].J.rows();
+      target.segment(row, rows) =
+          contacts[i].begin_mm + p.segment<3>(3 * static_cast<Eigen::Index>(i)).replicate(rows / 3, 1);
+      row += rows;
+    }
+    return target;
+  }
+
+  /// Everything that hangs on which contacts there are; u stays.
+  void tie() {
+    Eigen::Index rows = 0;
+    std::vector<Eigen::Triplet<double>> entries;
+    for (const Contact& contact : contacts) {
+      for (Eigen::Index column = 0; column < contact.J.outerSize(); ++column)
+        for (Eigen::SparseMatrix<double>::InnerIterator entry(contact.J, column); entry; ++entry)
+          entries.emplace_back(rows + entry.row(), entry.col(), entry.value());
+      rows += contact.J.rows();
+    }
+    J.resize(rows, model.unknown_count());
+    J.setFromTriplets(entries.begin(), entries.end());
+    secants.clear();
+    system.reset();
+    if (!contacts.empty()) system = std::make_unique<BorderedSystem>(model, J);
+    lambda = Eigen::VectorXd::Zero(rows);
+    last_step = earlier_step = {};
+  }
 
   double energy(const Eigen::VectorXd& reduced) const { return model.energy(model.expand(reduced)); }
   bool exhausted() const { return iterations_left <= 0 || solves_left <= 0; }
@@ -100,8 +138,8 @@ struct EquilibriumSolver::State {
   }
 
   /// Where the last steps lead when the tip goes on in their direction, else the state as it is.
-  Trial begin(const Vec3& p, const Eigen::VectorXd& target) const {
-    const Vec3 dp_mm = p - displacement_mm;
+  Trial begin(const Eigen::VectorXd& p, const Eigen::VectorXd& target) const {
+    const Eigen::VectorXd dp_mm = p - displacement_mm;
     const std::optional<double> share = ahead(dp_mm, last_step);
     if (!share) return weigh(u, target);
     Eigen::VectorXd du = *share * last_step.du;
@@ -113,7 +151,8 @@ struct EquilibriumSolver::State {
   }
 
   /// How many times the step goes into dp, where it has the same direction.
-  static std::optional<double> ahead(const Vec3& dp_mm, const Step& step) {
+  static std::optional<double> ahead(const Eigen::VectorXd& dp_mm, const Step& step) {
+    if (step.dp_mm.size() != dp_mm.size()) return std::nullopt;
     const double along = dp_mm.dot(step.dp_mm);
     if (!(along > kSameDirection * dp_mm.norm() * step.dp_mm.norm())) return std::nullopt;
     const double share = along / step.dp_mm.squaredNorm();
@@ -121,7 +160,7 @@ struct EquilibriumSolver::State {
     return share;
   }
 
-  void keep(const Trial& trial, const Vec3& p) {
+  void keep(const Trial& trial, const Eigen::VectorXd& p) {
     earlier_step = std::exchange(last_step, {trial.u - u, p - displacement_mm});
     u = trial.u;
     lambda = trial.lambda;
@@ -130,8 +169,8 @@ struct EquilibriumSolver::State {
 
   /// Newton towards J u = p for one step of the displacement. A failure leaves the state as it was; running out of
   /// solves leaves it where it has come.
-  Reached newton(const Vec3& p) {
-    const Eigen::VectorXd target = p.replicate(J.rows() / 3, 1);
+  Reached newton(const Eigen::VectorXd& p) {
+    const Eigen::VectorXd target = target_of(p);
     Trial trial = begin(p, target);
     if (!system->usable() || system->stale()) {
       solves_left -= kFactorCost;
@@ -235,16 +274,31 @@ struct EquilibriumSolver::State {
     return false;
   }
 
-  Reached move_to(const Vec3& p, int depth) {
+  Reached move_to(const Eigen::VectorXd& p, int depth) {
     const Reached reached = newton(p);
     if (reached.converged || depth >= kMostSubdivisions || exhausted()) return reached;
     const Reached half = move_to(0.5 * (displacement_mm + p), depth + 1);
     return half.converged ? move_to(p, depth + 1) : half;
   }
 
-  Vec3 contact_force_N() const {
-    const Eigen::VectorXd on_tissue = -(J.transpose() * lambda);
-    return Eigen::Map<const Eigen::Matrix3Xd>(on_tissue.data(), 3, on_tissue.size() / 3).rowwise().sum();
+  std::vector<ContactForce> contact_forces() const {
+    std::vector<ContactForce> forces;
+    Eigen::Index row = 0;
+    for (const Contact& contact : contacts) {
+      const Eigen::VectorXd on_tissue = -(contact.J.transpose() * lambda.segment(row, contact.J.rows()));
+      row += contact.J.rows();
+      ContactForce force;
+      int loaded_nodes = 0;
+      for (Eigen::Index i = 0; i + 2 < on_tissue.size(); i += 3) {
+        const Vec3 nodal_N = on_tissue.segment<3>(i);
+        force.force_N += nodal_N;
+        force.mean_nodal_force_N += nodal_N.norm();
+        loaded_nodes += nodal_N.norm() > 0;
+      }
+      if (loaded_nodes > 0) force.mean_nodal_force_N /= loaded_nodes;
+      forces.push_back(force);
+    }
+    return forces;
   }
 
   Equilibrium answer(const Reached& reached) const {
@@ -255,16 +309,9 @@ struct EquilibriumSolver::State {
     result.u = model.expand(u);
     result.lambda = lambda;
     result.smallest_volume_ratio = model.smallest_volume_ratio(result.u);
-    result.force_N = contact_force_N();
-    const Eigen::VectorXd on_tissue = J.transpose() * lambda;
-    double sum_of_norms = 0;
-    int loaded_nodes = 0;
-    for (Eigen::Index i = 0; i + 2 < on_tissue.size(); i += 3) {
-      const double magnitude_N = on_tissue.segment<3>(i).norm();
-      sum_of_norms += magnitude_N;
-      loaded_nodes += magnitude_N > 0;
-    }
-    if (loaded_nodes > 0) result.mean_nodal_force_N = sum_of_norms / loaded_nodes;
+    result.contacts = contact_forces();
+    result.force_N = result.contacts.front().force_N;
+    result.mean_nodal_force_N = result.contacts.front().mean_nodal_force_N;
     return result;
   }
 };
@@ -275,30 +322,51 @@ EquilibriumSolver::~EquilibriumSolver() = default;
 EquilibriumSolver::EquilibriumSolver(EquilibriumSolver&&) noexcept = default;
 
 void EquilibriumSolver::hold(const Footprint& footprint) {
+  release();
+  hold_also(footprint);
+}
+
+void EquilibriumSolver::hold_also(const Footprint& footprint) {
   State& s = *state_;
-  s.footprint = footprint;
-  s.J = constraint_matrix(s.model, footprint);
-  s.secants.clear();
-  s.system = std::make_unique<BorderedSystem>(s.model, s.J);
-  s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
-  s.lambda = Eigen::VectorXd::Zero(s.J.rows());
-  s.displacement_mm.setZero();
-  s.last_step = s.earlier_step = {};
-  s.balanced = true;
+  if (s.contacts.empty()) {
+    s.u = Eigen::VectorXd::Zero(s.model.unknown_count());
+    s.displacement_mm.resize(0);
+    s.balanced = true;
+  }
+  State::Contact contact;
+  contact.J = constraint_matrix(s.model, footprint);
+  contact.begin_mm = contact.J * s.u;
+  s.contacts.push_back(std::move(contact));
+  s.displacement_mm.conservativeResize(s.displacement_mm.size() + 3);
+  s.displacement_mm.tail<3>().setZero();
+  s.tie();
+}
+
+void EquilibriumSolver::let_go(size_t number) {
+  State& s = *state_;
+  s.contacts.erase(s.contacts.begin() + static_cast<std::ptrdiff_t>(number));
+  const Eigen::Index after = s.displacement_mm.size() - 3 * static_cast<Eigen::Index>(number) - 3;
+  const Eigen::VectorXd moved_up = s.displacement_mm.tail(after);
+  s.displacement_mm.conservativeResize(s.displacement_mm.size() - 3);
+  s.displacement_mm.tail(after) = moved_up;
+  s.balanced = false;
+  s.tie();
 }
 
 ContactStiffness EquilibriumSolver::contact_stiffness() {
   State& s = *state_;
   ContactStiffness answer;
   if (!s.system) return answer;
-  answer.displacement_mm = s.displacement_mm;
-  answer.force_N = s.contact_force_N();
+  answer.displacement_mm = s.displacement_mm.head<3>();
+  answer.force_N = s.contact_forces().front().force_N;
   if (!s.system->usable() && !s.system->factorize(s.model, s.model.expand(s.u))) return answer;
   // B = du/dp minimises B^T K B within J B = I, so that a small error of B counts squared.
   const Eigen::VectorXd no_force = Eigen::VectorXd::Zero(s.u.size());
   Eigen::MatrixXd B(s.u.size(), 3), KB(s.u.size(), 3);
   for (int i = 0; i < 3; ++i) {
-    const Eigen::VectorXd along = Vec3::Unit(i).replicate(s.J.rows() / 3, 1);
+    const Eigen::Index rows = s.contacts.front().J.rows();
+    Eigen::VectorXd along = Eigen::VectorXd::Zero(s.J.rows());
+    along.head(rows) = Vec3::Unit(i).replicate(rows / 3, 1);
     int solves = 0;
     B.col(i) = s.system->solve_at(s.model, s.model.expand(s.u), no_force, along, kStiffnessShare, solves).du;
     KB.col(i) = s.system->times_stiffness(B.col(i));
@@ -308,10 +376,11 @@ ContactStiffness EquilibriumSolver::contact_stiffness() {
 }
 
 void EquilibriumSolver::release() {
+  state_->contacts.clear();
   state_->system.reset();
 }
 
-Equilibrium EquilibriumSolver::solve(const Vec3& displacement_mm) {
+Equilibrium EquilibriumSolver::solve_all(const std::vector<Vec3>& displacements_mm) {
   State& s = *state_;
   if (!s.system) {
     Equilibrium rest;
@@ -322,13 +391,19 @@ Equilibrium EquilibriumSolver::solve(const Vec3& displacement_mm) {
   State::Reached reached;
   reached.converged = true;
   s.iterations_left = s.options.most_iterations;
-  const Vec3 from = s.displacement_mm;
-  const int parts =
-      std::max(1, static_cast<int>(std::ceil((displacement_mm - from).norm() / s.options.longest_step_mm)));
+  const Eigen::VectorXd from = s.displacement_mm;
+  Eigen::VectorXd to(from.size());
+  double farthest_mm = 0;
+  for (size_t i = 0; i < s.contacts.size(); ++i) {
+    const Eigen::Index at = 3 * static_cast<Eigen::Index>(i);
+    to.segment<3>(at) = displacements_mm.at(i);
+    farthest_mm = std::max(farthest_mm, (displacements_mm[i] - from.segment<3>(at)).norm());
+  }
+  const int parts = std::max(1, static_cast<int>(std::ceil(farthest_mm / s.options.longest_step_mm)));
   s.solves_left = parts * s.options.most_solves;
   if (!s.balanced) reached = s.newton(from);
   for (int part = 1; part <= parts && reached.converged; ++part)
-    reached = s.move_to(from + (displacement_mm - from) * part / parts, 0);
+    reached = s.move_to(from + (to - from) * part / parts, 0);
   return s.answer(reached);
 }
 

@@ -15,16 +15,23 @@ struct EquilibriumOptions {
   double longest_step_mm = 2.0;  ///< prescribed displacement applied at once
 };
 
+/// What one of the contacts does to the tissue.
+struct ContactForce {
+  Vec3 force_N = Vec3::Zero();    ///< of the instrument on the tissue: sum of -J^T lambda over its rows
+  double mean_nodal_force_N = 0;  ///< F_f of the paper: mean magnitude of the nodal forces around the contact
+};
+
 /// Answer of Eq. 3, with everything needed to judge it.
 struct Equilibrium {
   bool converged = false;
   double residual = 0;  ///< largest unbalanced nodal force over the largest contact force
   int iterations = 0;
   double smallest_volume_ratio = 1;
-  Eigen::VectorXd u;              ///< displacement of every node, mm (3 n)
-  Eigen::VectorXd lambda;         ///< multipliers, 3 per sample, N
-  Vec3 force_N = Vec3::Zero();    ///< of the instrument on the tissue: sum of -J^T lambda
-  double mean_nodal_force_N = 0;  ///< F_f of the paper: mean magnitude of the nodal forces around the contact
+  Eigen::VectorXd u;                   ///< displacement of every node, mm (3 n)
+  Eigen::VectorXd lambda;              ///< multipliers, 3 per sample of each contact in turn, N
+  std::vector<ContactForce> contacts;  ///< in the order in which they were held
+  Vec3 force_N = Vec3::Zero();         ///< of the first of them
+  double mean_nodal_force_N = 0;       ///< of the first of them
 };
 
 /// The force for a tip near a solved state, at any rate: F(p) = force + stiffness (p - displacement).
@@ -36,25 +43,32 @@ struct ContactStiffness {
   Vec3 force_at(const Vec3& p_mm) const { return force_N + stiffness_N_per_mm * (p_mm - displacement_mm); }
 };
 
-/// Keeps the factor and the last state of one body with one footprint; solves for the displacement p of the footprint.
+/// Keeps the factor and the last state of one body with the footprints that are held; solves for the displacements p of
+/// the footprints.
 class EquilibriumSolver {
  public:
   explicit EquilibriumSolver(const TetModel& model, const EquilibriumOptions& options = {});
   ~EquilibriumSolver();
   EquilibriumSolver(EquilibriumSolver&&) noexcept;
 
-  /// Begins a contact from rest (u = 0).
+  /// Begins a contact from rest (u = 0), the only one.
   void hold(const Footprint& footprint);
-  /// Ends it.
+  /// Begins one more contact on the tissue as it is now: its displacement counts from here.
+  void hold_also(const Footprint& footprint);
+  /// Ends contact `number`, counted from 0 in the order in which they were held; those after it move up.
+  void let_go(size_t number);
+  /// Ends all of them.
   void release();
 
-  /// Newton on Eq. 3 from the last state: K u + J^T lambda = f, J u = p with the same p for every sample. The factor of
-  /// an earlier state serves as long as it makes the residual fall quickly, then as the preconditioner of conjugate
-  /// gradients. An answer that ran out of `most_solves` is where the next call goes on.
-  Equilibrium solve(const Vec3& displacement_mm);
+  /// Newton on Eq. 3 from the last state: K u + J^T lambda = f, J u = p with the same p for every sample of a contact.
+  /// The factor of an earlier state serves as long as it makes the residual fall quickly, then as the preconditioner of
+  /// conjugate gradients. An answer that ran out of `most_solves` is where the next call goes on. One displacement per
+  /// contact.
+  Equilibrium solve_all(const std::vector<Vec3>& displacements_mm);
+  Equilibrium solve(const Vec3& displacement_mm) { return solve_all({displacement_mm}); }
 
-  /// The stiffness of the contact at the state of the last answer: (J K^-1 J^T)^-1 condensed on one displacement of all
-  /// samples, by three solves.
+  /// The stiffness of the first contact at the state of the last answer, the others held where they are:
+  /// (J K^-1 J^T)^-1 condensed on one displacement of all its samples, by three solves.
   ContactStiffness contact_stiffness();
 
  private:

@@ -184,5 +184,89 @@ TEST(Detect, TheGapIsPositiveOutsideAndNegativeInside) {
   EXPECT_NEAR(gap_to_surface({20, 20, 0.7}, block.mesh.nodes_mm, block.boundary).distance_mm, -0.7, 1e-12);
 }
 
+/// Two patches of the block's top face, 16 mm apart.
+struct TwoContacts {
+  Block block;
+  TetModel model = block.model_of(Law::neo_hookean, 27);
+  Footprint left = make_footprint(model, block.boundary, {12, 20, 0}, 3);
+  Footprint right = make_footprint(model, block.boundary, {28, 20, 0}, 3);
+};
+
+TEST(TwoContacts, EachFollowsItsOwnDisplacementAndTogetherTheyBalanceTheAttachments) {
+  const TwoContacts two;
+  EquilibriumSolver solver(two.model);
+  solver.hold(two.left);
+  solver.hold_also(two.right);
+  const Vec3 p(0, 0, -3), q(1, -1, 1.5);
+  const Equilibrium found = solver.solve_all({p, q});
+  ASSERT_TRUE(found.converged);
+  const Eigen::VectorXd u = two.model.reduce(found.u);
+  const Eigen::VectorXd left = constraint_matrix(two.model, two.left) * u;
+  const Eigen::VectorXd right = constraint_matrix(two.model, two.right) * u;
+  EXPECT_LT((left - p.replicate(left.size() / 3, 1)).lpNorm<Eigen::Infinity>(), 1e-8);
+  EXPECT_LT((right - q.replicate(right.size() / 3, 1)).lpNorm<Eigen::Infinity>(), 1e-8);
+  Vec3 reaction = Vec3::Zero();
+  const Eigen::VectorXd internal = two.model.internal_force(found.u);
+  for (int node : test::nodes_at(two.block.mesh, 2, 20)) reaction += internal.segment<3>(3 * node);
+  ASSERT_EQ(found.contacts.size(), 2u);
+  const Vec3 together = found.contacts[0].force_N + found.contacts[1].force_N;
+  EXPECT_LT((together + reaction).norm(), 1e-5 * found.contacts[0].force_N.norm());
+  EXPECT_EQ(found.force_N, found.contacts[0].force_N);
+}
+
+TEST(TwoContacts, TheForceOfEachOnTheOtherIsReciprocal) {
+  const TwoContacts two;
+  constexpr double kSmall_mm = 1e-3;
+  Mat3 left_by_right, right_by_left;
+  for (int i = 0; i < 3; ++i) {
+    EquilibriumSolver solver(two.model, {.relative_residual = 1e-10});
+    solver.hold(two.left);
+    solver.hold_also(two.right);
+    right_by_left.col(i) = solver.solve_all({kSmall_mm * Vec3::Unit(i), Vec3::Zero()}).contacts[1].force_N;
+    left_by_right.col(i) = solver.solve_all({Vec3::Zero(), kSmall_mm * Vec3::Unit(i)}).contacts[0].force_N;
+  }
+  EXPECT_GT(left_by_right.norm(), 0);
+  EXPECT_LT((left_by_right - right_by_left.transpose()).norm(), 1e-2 * left_by_right.norm());
+}
+
+TEST(TwoContacts, OneThatBeginsOnDisplacedTissueBeginsWithoutForceAndLeavesNoTraceWhenItLetsGo) {
+  const TwoContacts two;
+  EquilibriumSolver alone(two.model, {.relative_residual = 1e-9}), joined(two.model, {.relative_residual = 1e-9});
+  const Vec3 p(0.5, 0, -3), q(0, 1, -2);
+  alone.hold(two.left);
+  joined.hold(two.left);
+  const Equilibrium before = alone.solve(p);
+  joined.solve(p);
+  joined.hold_also(two.right);
+  const Equilibrium begun = joined.solve_all({p, Vec3::Zero()});
+  ASSERT_TRUE(begun.converged);
+  EXPECT_LT(begun.contacts[1].force_N.norm(), 1e-6 * before.force_N.norm());
+  EXPECT_LT((begun.force_N - before.force_N).norm(), 1e-6 * before.force_N.norm());
+  const Equilibrium held = joined.solve_all({p, q});
+  ASSERT_TRUE(held.converged);
+  EXPECT_GT(held.contacts[1].force_N.dot(q), 0);
+  joined.let_go(1);
+  const Equilibrium after = joined.solve(p);
+  ASSERT_TRUE(after.converged);
+  EXPECT_LT((after.u - before.u).lpNorm<Eigen::Infinity>(), 1e-6);
+  EXPECT_LT((after.force_N - before.force_N).norm(), 1e-6 * before.force_N.norm());
+}
+
+TEST(TwoContacts, TheSecondStaysWhereItIsWhenTheFirstLetsGo) {
+  const TwoContacts two;
+  EquilibriumSolver solver(two.model, {.relative_residual = 1e-9});
+  solver.hold(two.left);
+  solver.hold_also(two.right);
+  const Vec3 p(0, 0, -3), q(1, -1, -1);
+  solver.solve_all({p, q});
+  solver.let_go(0);
+  const Equilibrium left_over = solver.solve(q);
+  EquilibriumSolver alone(two.model, {.relative_residual = 1e-9});
+  alone.hold(two.right);
+  const Equilibrium expected = alone.solve(q);
+  ASSERT_TRUE(left_over.converged && expected.converged);
+  EXPECT_LT((left_over.force_N - expected.force_N).norm(), 1e-6 * expected.force_N.norm());
+}
+
 }  // namespace
 }  // namespace palpate
