@@ -62,7 +62,7 @@ struct ForceEstimator::State {
   Rectification rectification;
   AttachmentOptions attachments;
   ContactOptions options;
-  TipTracker tracker;
+  InstrumentTracker tracker;
   MapWatch map_watch;
   std::array<cv::Mat, 2> last_pictures;
   OnsetDetector onset;
@@ -93,40 +93,42 @@ struct ForceEstimator::State {
     return same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
   }
 
-  void begin_contact(const RectifiedPair& pair, const TipObservation& tip, const Gap& gap) {
+  void begin_contact(const RectifiedPair& pair, const InstrumentObservations& seen, const Gap& gap) {
     const double radius_mm = options.footprint_radius_mm;
     const TetMesh refined =
         refine_near(map.mesh, gap.surface_point_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
     const std::vector<int> fixed = select_attachments(
         refined, attachments, [this](const Vec3& point) { return project_to_recorded_left(rectification.rig, point); });
     held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options, map.element);
-    onset_tip_mm = tip.tip_mm;
-    tracker.mark();
+    onset_tip_mm = seen.tips[0].tip_mm;
+    tracker.mark(0);
     release.start();
-    tissue_motion.start(pair, tip.left_mask, gap.surface_point_mm,
+    tissue_motion.start(pair, seen.left_mask, gap.surface_point_mm,
                         std::max(kLeastWatched_mm, kWatchedRadii * radius_mm));
   }
 
   void end_contact(const Vec3& tip_mm) {
     held.reset();
-    tracker.unmark();
+    tracker.unmark(0);
     tissue_motion.stop();
     onset.let_go(tip_mm);
   }
 
   /// Where the free tip stands against the map at rest, and whether it begins to touch (Eq. 4).
-  void look_for_contact(const RectifiedPair& pair, const TipObservation& tip) {
+  void look_for_contact(const RectifiedPair& pair, const InstrumentObservations& seen) {
+    const TipObservation& tip = seen.tips[0];
     const Gap gap = gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary);
     const double deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
     const bool comes_to_rest = onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
     const bool closes = tip.closed.value_or(false) && was_closed == false && gap.distance_mm < options.threshold_mm;
     was_closed = tip.closed;
-    if (closes || (comes_to_rest && tip.closed.value_or(true))) begin_contact(pair, tip, gap);
+    if (closes || (comes_to_rest && tip.closed.value_or(true))) begin_contact(pair, seen, gap);
   }
 
   /// u, lambda of Eq. 3 for the tip's displacement since onset; ends the contact when the image or the grip says so.
-  std::optional<Equilibrium> solve_contact(const RectifiedPair& pair, const TipObservation& tip,
+  std::optional<Equilibrium> solve_contact(const RectifiedPair& pair, const InstrumentObservations& instruments,
                                            ForceEstimate& estimate) {
+    const TipObservation& tip = instruments.tips[0];
     if (tip.closed && !*tip.closed) {
       end_contact(tip.tip_mm);
       was_closed = false;
@@ -140,7 +142,7 @@ struct ForceEstimator::State {
       end_contact(tip.tip_mm);
       return std::nullopt;
     }
-    const std::vector<TissuePoint> seen = tissue_motion.update(pair, tip.left_mask, tip.right_mask);
+    const std::vector<TissuePoint> seen = tissue_motion.update(pair, instruments.left_mask, instruments.right_mask);
     std::vector<Vec3> rest;
     for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
     const std::vector<Vec3> predicted = displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest);
@@ -196,11 +198,12 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   const bool repeated = s.is_repeated(pair);
   estimate.times.rectify_ms = watch.lap_ms();
 
-  const TipObservation tip = s.tracker.update(pair);
-  estimate.left_instrument_mask = tip.left_mask;
-  if (tip.eyes_out_of_step) estimate.warnings.push_back("eyes_out_of_step");
+  const InstrumentObservations seen = s.tracker.update(pair);
+  const TipObservation& tip = seen.tips[0];
+  estimate.left_instrument_mask = seen.left_mask;
+  if (seen.eyes_out_of_step) estimate.warnings.push_back("eyes_out_of_step");
   MapWatch::Answer scene;
-  if (frame.index > s.map.frame) scene = s.map_watch.update(pair.left, tip.left_mask);
+  if (frame.index > s.map.frame) scene = s.map_watch.update(pair.left, seen.left_mask);
   estimate.times.track_ms = watch.lap_ms();
 
   if (!tip.visible || scene.veiled) {
@@ -218,14 +221,14 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   // tip.
   const bool stale = scene.map_is_stale;
   if (stale) estimate.status = FrameStatus::map_stale;
-  if (!s.held && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, tip);
+  if (!s.held && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, seen);
   estimate.times.contact_ms = watch.lap_ms();
   if (!s.held) {
     s.lost_frames = 0;
     return estimate;
   }
 
-  const auto equilibrium = s.solve_contact(pair, tip, estimate);
+  const auto equilibrium = s.solve_contact(pair, seen, estimate);
   s.lost_frames = 0;
   estimate.times.solve_ms = watch.lap_ms();
   if (!equilibrium) return estimate;

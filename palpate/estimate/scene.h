@@ -5,7 +5,7 @@
 #include "palpate/contact/contact_options.h"
 #include "palpate/core/settings.h"
 #include "palpate/estimate/tissue_map.h"
-#include "palpate/instrument/tip_tracker.h"
+#include "palpate/instrument/instrument_tracker.h"
 #include "palpate/stereo/recording.h"
 
 namespace palpate {

@@ -24,7 +24,8 @@ struct EdgeLine {
 };
 
 constexpr int kLeastPixels = 60;
-constexpr double kSolid = 0.85;  // share of a slice of the shaft that belongs to the mask
+constexpr double kApartWidths = 2;  // between the places where two shafts enter
+constexpr double kSolid = 0.85;     // share of a slice of the shaft that belongs to the mask
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -162,16 +163,35 @@ cv::Point2d far_end(const std::vector<Slice>& slices, double first, double width
   return {first + static_cast<double>(last) + beyond, weight > 0 ? across / weight : 0.0};
 }
 
+/// Whether the pixels at the border lie at places further apart than one shaft explains.
+bool at_two_places(const std::vector<cv::Point>& entering, double width) {
+  constexpr int kReach_px = 3;
+  const cv::Rect box = cv::boundingRect(entering);
+  if (std::hypot(box.width, box.height) < kApartWidths * width) return false;
+  cv::Mat drawn = cv::Mat::zeros(box.size() + cv::Size(2 * kReach_px, 2 * kReach_px), CV_8U);
+  for (const cv::Point& p : entering) drawn.at<uchar>(p - box.tl() + cv::Point(kReach_px, kReach_px)) = 255;
+  cv::dilate(drawn, drawn, cv::Mat::ones(2 * kReach_px + 1, 2 * kReach_px + 1, CV_8U));
+  cv::Mat labels, stats, centres;
+  const int count = cv::connectedComponentsWithStats(drawn, labels, stats, centres, 8);
+  for (int a = 1; a < count; ++a)
+    for (int b = a + 1; b < count; ++b) {
+      const cv::Point2d apart(centres.at<double>(a, 0) - centres.at<double>(b, 0),
+                              centres.at<double>(a, 1) - centres.at<double>(b, 1));
+      if (cv::norm(apart) > kApartWidths * width) return true;
+    }
+  return false;
+}
+
 std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border) {
   cv::Point2d entry(0, 0);
-  int entering = 0;
+  std::vector<cv::Point> entering;
   for (const cv::Point& p : pixels) {
     if (!border.at<uchar>(p)) continue;
     entry += cv::Point2d(p);
-    ++entering;
+    entering.push_back(p);
   }
-  if (entering == 0) return {};
-  entry *= 1.0 / entering;
+  if (entering.empty()) return {};
+  entry *= 1.0 / static_cast<double>(entering.size());
 
   cv::Point2d axis(0, 0);
   double farthest = 0;
@@ -195,7 +215,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest)) return {};
+  if (!looks_like_an_instrument(shaft, farthest) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);
   ImageTip tip;
@@ -207,9 +227,11 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
 
 }  // namespace
 
-std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
+std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
+                                              size_t most) {
+  std::vector<ImageInstrument> found;
   const cv::Rect box = cv::boundingRect(instrument_mask);
-  if (box.area() < kLeastPixels) return {};
+  if (box.area() < kLeastPixels) return found;
   const cv::Mat border = image_border(instrument_mask.size(), box);
   cv::Mat labels, stats, centres;
   const int count = cv::connectedComponentsWithStats(instrument_mask(box), labels, stats, centres, 8);
@@ -219,15 +241,23 @@ std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& 
   std::sort(by_size.begin(), by_size.end(),
             [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
   for (int label : by_size) {
+    if (found.size() == most) break;
     std::vector<cv::Point> pixels;
-    cv::findNonZero(labels == label, pixels);
+    const cv::Mat part = labels == label;
+    cv::findNonZero(part, pixels);
     const bool from_image_border = touches(pixels, border) || picture_area.empty();
     if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box))) {
       tip->tip_px += cv::Point2d(box.tl());
-      return tip;
+      found.push_back({*tip, box, part});
     }
   }
-  return {};
+  return found;
+}
+
+std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
+  const std::vector<ImageInstrument> found = find_instruments(instrument_mask, picture_area, 1);
+  if (found.empty()) return {};
+  return found[0].tip;
 }
 
 }  // namespace palpate

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
-#include "palpate/instrument/tip_tracker.h"
+#include "palpate/instrument/tip_track.h"
 
 namespace palpate {
 

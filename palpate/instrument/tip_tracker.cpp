@@ -1,17 +1,6 @@
 #include "palpate/instrument/tip_tracker.h"
 
-#include <fmt/format.h>
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
-#include <array>
-
-#include "palpate/core/errors.h"
-#include "palpate/instrument/eye_lag.h"
-#include "palpate/instrument/find_tip.h"
-#include "palpate/instrument/rigid_motion.h"
-#include "palpate/instrument/segment.h"
-#include "palpate/instrument/tip_filter.h"
 
 namespace palpate {
 
@@ -22,6 +11,7 @@ constexpr double kGoodAgreement = 0.6;        // below, a keyframe has become to
 constexpr double kLeastAgreementAlone = 0.5;  // for a frame in which the mask gives no tip
 constexpr double kKeyframeReach_px = 40;      // motion after which a fresh keyframe is better
 constexpr int kMostFramesAlone = 5;           // without any tip from the masks
+constexpr int kMostFramesTouching = 100;      // the same beside another instrument, where none can be expected
 constexpr int kMostRejected = 3;              // detections outside the gate before the filter starts anew
 constexpr double kThinnest_mm = 0.8;          // shaft of an instrument
 constexpr double kThickest_mm = 25;
@@ -30,13 +20,6 @@ constexpr double kDisparityFloor_px = 0.05;
 constexpr double kBias_mm = 0.25;  // what does not average out over frames: outline, one side of the jaws seen
 constexpr double kMotionFloor_mm = 0.02;
 constexpr double kMotionModelShare = 0.04;  // of a displacement: light that does not move along, depths of the template
-
-/// One eye in one frame.
-struct EyeView {
-  cv::Mat mask;
-  std::optional<ImageTip> tip;
-  ImageLayers layers;
-};
 
 double followed_length_px(const ImageTip& tip) {
   return std::clamp(kTemplateWidths * tip.width_px, 60.0, 220.0);
@@ -50,14 +33,6 @@ cv::Rect region_around(const ImageTip& tip) {
   return {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)};
 }
 
-/// What a frame says about the tip without the frames before it; rectified frame.
-struct Detection {
-  InstrumentPlane plane;
-  PatchTemplate left_template;
-  Vec3 tip_mm = Vec3::Zero();
-  Mat3 covariance_mm2 = Mat3::Identity();
-};
-
 Vec3 rectified_point(const Rectification& r, const cv::Point2d& left_px, double disparity) {
   const double z = r.depth_mm(disparity);
   return {(left_px.x - r.principal_x_px) * z / r.focal_px, (left_px.y - r.principal_y_px) * z / r.focal_px, z};
@@ -67,11 +42,30 @@ cv::Point2d left_pixel(const Rectification& r, const Vec3& p) {
   return {r.focal_px * p.x() / p.z() + r.principal_x_px, r.focal_px * p.y() / p.z() + r.principal_y_px};
 }
 
-std::optional<Detection> detect(const EyeView& left, const EyeView& right, const Rectification& r) {
-  if (!left.tip || !right.tip) return {};
+}  // namespace
+
+ImageLayers layers_around(const cv::Mat& bgr, const ImageTip& tip, const SegmentationModel& model) {
+  return make_layers(bgr, region_around(tip), model);
+}
+
+bool can_be_one_tip(const ImageTip& left, const ImageTip& right) {
+  const double disparity = left.tip_px.x - right.tip_px.x;
+  const double rows = std::abs(left.tip_px.y - right.tip_px.y);
+  return disparity >= 1 && rows <= 4 + 0.15 * left.width_px && left.axis.dot(right.axis) >= 0.9;
+}
+
+/// What a frame says about the tip without the frames before it; rectified frame.
+struct TipTracker::Detection {
+  InstrumentPlane plane;
+  PatchTemplate left_template;
+  Vec3 tip_mm = Vec3::Zero();
+  Mat3 covariance_mm2 = Mat3::Identity();
+};
+
+std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, const EyeView& right) const {
+  const Rectification& r = rectification_;
+  if (!left.tip || !right.tip || !can_be_one_tip(*left.tip, *right.tip)) return {};
   const double guess = left.tip->tip_px.x - right.tip->tip_px.x;
-  const double rows = std::abs(left.tip->tip_px.y - right.tip->tip_px.y);
-  if (guess < 1 || rows > 4 + 0.15 * left.tip->width_px || left.tip->axis.dot(right.tip->axis) < 0.9) return {};
   Detection detection;
   detection.left_template = make_template(left.layers, left.mask, *left.tip, followed_length_px(*left.tip));
   const auto plane = match_instrument(detection.left_template, left.tip->tip_px, right.layers, guess, r.focal_px);
@@ -91,270 +85,192 @@ std::optional<Detection> detect(const EyeView& left, const EyeView& right, const
   return detection;
 }
 
-InstrumentKeyframe make_keyframe(Detection detection, const EyeView& right) {
-  InstrumentKeyframe keyframe;
-  ImageTip right_tip = *right.tip;
-  right_tip.tip_px = detection.plane.origin_px - cv::Point2d(detection.plane.disparity[0], 0);
-  keyframe.right = make_template(right.layers, right.mask, right_tip, followed_length_px(right_tip));
-  keyframe.left = std::move(detection.left_template);
-  keyframe.plane = detection.plane;
-  keyframe.tip_mm = detection.tip_mm;
-  return keyframe;
-}
-
-}  // namespace
-
-struct TipTracker::State {
-  Rectification rectification;
-  std::optional<TipTrack> track;
-  std::array<SegmentationModel, 2> models;
-
-  TipFilter filter;
-  EyeLag eye_lag;
-  bool eyes_out_of_step = false;                          ///< as last found; it stays so while nothing moves
-  std::optional<ImageTip> last_left_tip, last_right_tip;  ///< where to look when a mask shows none
-  std::optional<InstrumentKeyframe> keyframe;
-  std::optional<InstrumentKeyframe> fresh_keyframe;  ///< of the last frame, should it be marked
-  RigidMotion motion;                                ///< since the keyframe, as last measured
-  std::optional<double> last_time_s;
-  int frames_alone = 0;
-  int rejected = 0;
-  bool visible = false;
-
-  bool marked = false;
-  std::optional<RigidMotion> motion_at_mark;  ///< since the keyframe; none when the mark came without a keyframe
-  Vec3 tip_at_mark_mm = Vec3::Zero();         ///< rectified frame, or left camera frame with a track
-  Mat3 covariance_at_mark_mm2 = Mat3::Zero();
-
-  EyeView view(const cv::Mat& bgr, const SegmentationModel& model, const std::optional<ImageTip>& expected) const;
-  std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
-                                                   const std::optional<Detection>& detection, double seconds) const;
-  void use_fresh_keyframe();
-  void advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
-               double seconds);
-  void lose();
-  TipObservation from_track(const RectifiedPair& pair);
-  void report_since_mark(TipObservation& observation) const;
-};
-
-EyeView TipTracker::State::view(const cv::Mat& bgr, const SegmentationModel& model,
-                                const std::optional<ImageTip>& expected) const {
-  EyeView eye;
-  eye.mask = segment_instrument(bgr, model);
-  eye.tip = find_tip(eye.mask, model.picture_area);
-  const std::optional<ImageTip>& look_at = eye.tip ? eye.tip : expected;
-  if (look_at) eye.layers = make_layers(bgr, region_around(*look_at), model);
-  return eye;
-}
-
-std::optional<RigidMotion> TipTracker::State::motion_since_keyframe(const EyeView& left, const EyeView& right,
-                                                                    const std::optional<Detection>& detection,
-                                                                    double seconds) const {
-  if (!keyframe) return {};
-  RigidMotion guess = motion;
-  if (filter.started()) guess.translation_mm += seconds * filter.velocity_mm_per_s();
-  const Light light = marked ? Light::gain_and_ramp : Light::offset;
-  auto best = measure_motion(*keyframe, left.layers, right.layers, rectification, guess, light);
-  if (best && best->agreement > kGoodAgreement) return best;
-  if (detection) {
-    guess.translation_mm = detection->tip_mm - keyframe->tip_mm;
-    const auto other = measure_motion(*keyframe, left.layers, right.layers, rectification, guess, light);
-    if (other && (!best || other->agreement > best->agreement)) best = other;
-  }
-  return best;
-}
-
-void TipTracker::State::use_fresh_keyframe() {
-  keyframe = std::move(fresh_keyframe);
-  fresh_keyframe.reset();
-  motion = RigidMotion();
-  motion.agreement = 1;
-}
-
-void TipTracker::State::advance(const std::optional<RigidMotion>& measured, bool followed,
-                                const std::optional<Detection>& detection, double seconds) {
-  const TipFilter before = filter;
-  std::optional<RigidMotion> taken = measured;
-  const auto corrected = [&] { return filter.correct(detection->tip_mm, detection->covariance_mm2); };
-  if (followed) {
-    const Mat3 floor = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
-    filter.move(measured->translation_mm - motion.translation_mm, measured->covariance_mm2 + floor, seconds);
-  } else if (filter.started()) {
-    filter.predict(seconds);
-  }
-  if (detection && (!filter.started() || rejected >= kMostRejected)) {
-    filter.start(detection->tip_mm, detection->covariance_mm2);
-    rejected = 0;
-  } else if (detection && corrected()) {
-    rejected = 0;
-  } else if (detection) {
-    // Motion and detection contradict each other: the one that continues the path so far is right, or comes nearer to
-    // it; a marked template, which the contact hangs on, has proved itself.
-    const TipFilter as_followed = filter;
-    filter = before;
-    filter.predict(seconds);
-    const Vec3 predicted_mm = filter.position_mm();
-    const bool is_nearer =
-        (detection->tip_mm - predicted_mm).norm() < (as_followed.position_mm() - predicted_mm).norm();
-    const bool continues = corrected();
-    if (followed && !marked && (continues || is_nearer)) {
-      if (!continues) filter.start(detection->tip_mm, detection->covariance_mm2);
-      taken.reset();
-      rejected = 0;
-    } else {
-      filter = as_followed;
-      ++rejected;
-    }
-  }
-  if (taken)
-    motion = *taken;
-  else
-    motion.agreement = 0;
-}
-
-void TipTracker::State::lose() {
-  visible = false;
-  filter.stop();
-  if (!marked) keyframe.reset();
-  fresh_keyframe.reset();
-  frames_alone = rejected = 0;
-}
-
-TipObservation TipTracker::State::from_track(const RectifiedPair& pair) {
+TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int index, double seconds,
+                                  bool touches_another) {
+  from_track_ = false;
+  std::optional<Detection> detection = detect(left, right);
+  const auto measured = motion_since_keyframe(left, right, detection, seconds);
+  frames_alone_ = detection ? 0 : frames_alone_ + 1;
+  const bool followed = measured && filter_.started() &&
+                        frames_alone_ <= (touches_another ? kMostFramesTouching : kMostFramesAlone) &&
+                        (detection || measured->agreement > kLeastAgreementAlone);
   TipObservation observation;
-  if (!pair.left.empty()) observation.left_mask = segment_instrument(pair.left, models[0]);
-  if (!pair.right.empty()) observation.right_mask = segment_instrument(pair.right, models[1]);
-  const auto row = track->rows.find(pair.index);
-  visible = row != track->rows.end();
-  if (!visible) return observation;
+  if (!detection && !followed) {
+    lose();
+    return observation;
+  }
+
+  advance(measured, followed, detection, seconds);
+  visible_ = true;
+
+  if (detection) {
+    eye_lag_.add(index, left.tip->tip_px.y, right.tip->tip_px.y);
+    eyes_out_of_step_ = eye_lag_.frames().value_or(eyes_out_of_step_ ? 1 : 0) != 0;
+  }
+  if (left.tip) last_tips_[0] = left.tip;
+  if (right.tip) last_tips_[1] = right.tip;
+  report_since_mark(observation);
+  renew_keyframe(std::move(detection), right);
+
+  const Mat3 left_from_rectified = rectification_.rectified_from_left.transpose();
+  observation.visible = true;
+  observation.tip_mm = left_from_rectified * filter_.position_mm();
+  observation.velocity_mm_per_s = left_from_rectified * filter_.velocity_mm_per_s();
+  observation.covariance_mm2 =
+      left_from_rectified * filter_.position_covariance_mm2() * left_from_rectified.transpose() +
+      kBias_mm * kBias_mm * Mat3::Identity();
+  return observation;
+}
+
+TipObservation TipTracker::update(const TipTrack& track, int index) {
+  from_track_ = true;
+  TipObservation observation;
+  const auto row = track.rows.find(index);
+  visible_ = row != track.rows.end();
+  if (!visible_) return observation;
   observation.visible = true;
   observation.tip_mm = row->second.tip_mm;
   observation.closed = row->second.closed;
   observation.covariance_mm2 = kBias_mm * kBias_mm * Mat3::Identity();
-  if (row != track->rows.begin()) {
+  if (row != track.rows.begin()) {
     const TipTrack::Row& before = std::prev(row)->second;
     const double seconds = row->second.time_s - before.time_s;
     if (seconds > 0) observation.velocity_mm_per_s = (row->second.tip_mm - before.tip_mm) / seconds;
   }
-  filter.start(observation.tip_mm, observation.covariance_mm2);
-  if (marked) {
-    observation.since_mark_mm = observation.tip_mm - tip_at_mark_mm;
+  filter_.start(observation.tip_mm, observation.covariance_mm2);
+  if (marked_) {
+    observation.since_mark_mm = observation.tip_mm - tip_at_mark_mm_;
     observation.since_mark_covariance_mm2 = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
   }
   return observation;
 }
 
-void TipTracker::State::report_since_mark(TipObservation& observation) const {
-  if (!marked) return;
-  const Mat3 left_from_rectified = rectification.rectified_from_left.transpose();
-  Vec3 since = filter.position_mm() - tip_at_mark_mm;
-  Mat3 covariance = filter.position_covariance_mm2() + covariance_at_mark_mm2;
-  if (motion_at_mark && motion.agreement > 0) {
-    since = motion.translation_mm - motion_at_mark->translation_mm;
+std::optional<RigidMotion> TipTracker::motion_since_keyframe(const EyeView& left, const EyeView& right,
+                                                             const std::optional<Detection>& detection,
+                                                             double seconds) const {
+  if (!keyframe_) return {};
+  RigidMotion guess = motion_;
+  if (filter_.started()) guess.translation_mm += seconds * filter_.velocity_mm_per_s();
+  const Light light = marked_ ? Light::gain_and_ramp : Light::offset;
+  auto best = measure_motion(*keyframe_, left.layers, right.layers, rectification_, guess, light);
+  if (best && best->agreement > kGoodAgreement) return best;
+  if (detection) {
+    guess.translation_mm = detection->tip_mm - keyframe_->tip_mm;
+    const auto other = measure_motion(*keyframe_, left.layers, right.layers, rectification_, guess, light);
+    if (other && (!best || other->agreement > best->agreement)) best = other;
+  }
+  return best;
+}
+
+void TipTracker::advance(const std::optional<RigidMotion>& measured, bool followed,
+                         const std::optional<Detection>& detection, double seconds) {
+  const TipFilter before = filter_;
+  std::optional<RigidMotion> taken = measured;
+  const auto corrected = [&] { return filter_.correct(detection->tip_mm, detection->covariance_mm2); };
+  if (followed) {
+    const Mat3 floor = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
+    filter_.move(measured->translation_mm - motion_.translation_mm, measured->covariance_mm2 + floor, seconds);
+  } else if (filter_.started()) {
+    filter_.predict(seconds);
+  }
+  if (detection && (!filter_.started() || rejected_ >= kMostRejected)) {
+    filter_.start(detection->tip_mm, detection->covariance_mm2);
+    rejected_ = 0;
+  } else if (detection && corrected()) {
+    rejected_ = 0;
+  } else if (detection) {
+    // Motion and detection contradict each other: the one that continues the path so far is right, or comes nearer to
+    // it; a marked template, which the contact hangs on, has proved itself.
+    const TipFilter as_followed = filter_;
+    filter_ = before;
+    filter_.predict(seconds);
+    const Vec3 predicted_mm = filter_.position_mm();
+    const bool is_nearer =
+        (detection->tip_mm - predicted_mm).norm() < (as_followed.position_mm() - predicted_mm).norm();
+    const bool continues = corrected();
+    if (followed && !marked_ && (continues || is_nearer)) {
+      if (!continues) filter_.start(detection->tip_mm, detection->covariance_mm2);
+      taken.reset();
+      rejected_ = 0;
+    } else {
+      filter_ = as_followed;
+      ++rejected_;
+    }
+  }
+  if (taken)
+    motion_ = *taken;
+  else
+    motion_.agreement = 0;
+}
+
+void TipTracker::renew_keyframe(std::optional<Detection> detection, const EyeView& right) {
+  const double travelled_px = keyframe_
+                                  ? cv::norm(left_pixel(rectification_, keyframe_->tip_mm) -
+                                             left_pixel(rectification_, keyframe_->tip_mm + motion_.translation_mm))
+                                  : 0;
+  const bool stale = !keyframe_ || motion_.agreement < kGoodAgreement || travelled_px > kKeyframeReach_px;
+  fresh_keyframe_.reset();
+  if (!detection || rejected_ > 0) return;
+  ImageTip right_tip = *right.tip;
+  right_tip.tip_px = detection->plane.origin_px - cv::Point2d(detection->plane.disparity[0], 0);
+  InstrumentKeyframe& fresh = fresh_keyframe_.emplace();
+  fresh.right = make_template(right.layers, right.mask, right_tip, followed_length_px(right_tip));
+  fresh.left = std::move(detection->left_template);
+  fresh.plane = detection->plane;
+  fresh.tip_mm = detection->tip_mm;
+  if (stale && !marked_) use_fresh_keyframe();
+}
+
+void TipTracker::use_fresh_keyframe() {
+  keyframe_ = std::move(fresh_keyframe_);
+  fresh_keyframe_.reset();
+  motion_ = RigidMotion();
+  motion_.agreement = 1;
+}
+
+void TipTracker::lose() {
+  visible_ = false;
+  filter_.stop();
+  if (!marked_) keyframe_.reset();
+  fresh_keyframe_.reset();
+  frames_alone_ = rejected_ = 0;
+}
+
+void TipTracker::report_since_mark(TipObservation& observation) const {
+  if (!marked_) return;
+  const Mat3 left_from_rectified = rectification_.rectified_from_left.transpose();
+  Vec3 since = filter_.position_mm() - tip_at_mark_mm_;
+  Mat3 covariance = filter_.position_covariance_mm2() + covariance_at_mark_mm2_;
+  if (motion_at_mark_ && motion_.agreement > 0) {
+    since = motion_.translation_mm - motion_at_mark_->translation_mm;
     const double model = kMotionModelShare * since.norm();
-    covariance = motion.covariance_mm2 + motion_at_mark->covariance_mm2 +
+    covariance = motion_.covariance_mm2 + motion_at_mark_->covariance_mm2 +
                  (kMotionFloor_mm * kMotionFloor_mm + model * model) * Mat3::Identity();
   }
   observation.since_mark_mm = left_from_rectified * since;
   observation.since_mark_covariance_mm2 = left_from_rectified * covariance * left_from_rectified.transpose();
 }
 
-void describe(Settings& settings, InstrumentOptions& options) {
-  settings.text("segmentation", options.segmentation, "how the instrument is found in the images: colour");
-  settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
-  settings.after_reading([&options] {
-    if (options.segmentation == "colour") return;
-    if (options.segmentation.ends_with(".onnx"))
-      throw BadInput(fmt::format("instrument.segmentation is '{}': networks are not there yet, expected colour",
-                                 options.segmentation));
-    throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour", options.segmentation));
-  });
-}
-
-TipTracker::TipTracker(const InstrumentOptions& options, const Rectification& rectification,
-                       const RectifiedPair& static_frame, const cv::Mat& organ_mask)
-    : state_(std::make_unique<State>()) {
-  state_->rectification = rectification;
-  if (!options.track.empty()) state_->track = read_tip_track(options.track);
-  tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
-                       [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); });
-}
-
-TipTracker::~TipTracker() = default;
-TipTracker::TipTracker(TipTracker&&) noexcept = default;
-
-TipObservation TipTracker::update(const RectifiedPair& pair) {
-  State& s = *state_;
-  if (s.track) return s.from_track(pair);
-
-  EyeView left, right;
-  tbb::parallel_invoke([&] { left = s.view(pair.left, s.models[0], s.last_left_tip); },
-                       [&] { right = s.view(pair.right, s.models[1], s.last_right_tip); });
-  TipObservation observation;
-  observation.left_mask = left.mask;
-  observation.right_mask = right.mask;
-  const double seconds = s.last_time_s ? std::max(pair.time_s - *s.last_time_s, 1e-3) : 0.04;
-  s.last_time_s = pair.time_s;
-
-  std::optional<Detection> detection = detect(left, right, s.rectification);
-  const auto measured = s.motion_since_keyframe(left, right, detection, seconds);
-  s.frames_alone = detection ? 0 : s.frames_alone + 1;
-  const bool followed = measured && s.filter.started() && s.frames_alone <= kMostFramesAlone &&
-                        (detection || measured->agreement > kLeastAgreementAlone);
-  if (!detection && !followed) {
-    s.lose();
-    return observation;
-  }
-
-  s.advance(measured, followed, detection, seconds);
-  s.visible = true;
-
-  if (detection) {
-    s.eye_lag.add(pair.index, left.tip->tip_px.y, right.tip->tip_px.y);
-    s.eyes_out_of_step = s.eye_lag.frames().value_or(s.eyes_out_of_step ? 1 : 0) != 0;
-  }
-  observation.eyes_out_of_step = s.eyes_out_of_step;
-  if (left.tip) s.last_left_tip = left.tip;
-  if (right.tip) s.last_right_tip = right.tip;
-  s.report_since_mark(observation);
-
-  const double travelled_px = s.keyframe
-                                  ? cv::norm(left_pixel(s.rectification, s.keyframe->tip_mm) -
-                                             left_pixel(s.rectification, s.keyframe->tip_mm + s.motion.translation_mm))
-                                  : 0;
-  const bool stale = !s.keyframe || s.motion.agreement < kGoodAgreement || travelled_px > kKeyframeReach_px;
-  if (detection && s.rejected == 0) {
-    s.fresh_keyframe = make_keyframe(std::move(*detection), right);
-    if (stale && !s.marked) s.use_fresh_keyframe();
-  } else {
-    s.fresh_keyframe.reset();
-  }
-
-  const Mat3 left_from_rectified = s.rectification.rectified_from_left.transpose();
-  observation.visible = true;
-  observation.tip_mm = left_from_rectified * s.filter.position_mm();
-  observation.velocity_mm_per_s = left_from_rectified * s.filter.velocity_mm_per_s();
-  observation.covariance_mm2 =
-      left_from_rectified * s.filter.position_covariance_mm2() * left_from_rectified.transpose() +
-      kBias_mm * kBias_mm * Mat3::Identity();
-  return observation;
+cv::Point2d TipTracker::expected_px(size_t eye, double seconds) const {
+  const Vec3 tip_mm = filter_.position_mm() + seconds * filter_.velocity_mm_per_s();
+  const double disparity = eye == 0 ? 0 : rectification_.disparity_px(tip_mm.z());
+  return left_pixel(rectification_, tip_mm) - cv::Point2d(disparity, 0);
 }
 
 void TipTracker::mark() {
-  State& s = *state_;
-  s.marked = s.visible;
-  s.motion_at_mark.reset();
-  if (!s.visible) return;
-  s.tip_at_mark_mm = s.filter.position_mm();
-  s.covariance_at_mark_mm2 = s.filter.position_covariance_mm2();
-  if (s.track) return;
-  if (s.fresh_keyframe) s.use_fresh_keyframe();
-  if (s.keyframe) s.motion_at_mark = s.motion;
+  marked_ = visible_;
+  motion_at_mark_.reset();
+  if (!visible_) return;
+  tip_at_mark_mm_ = filter_.position_mm();
+  covariance_at_mark_mm2_ = filter_.position_covariance_mm2();
+  if (from_track_) return;
+  if (fresh_keyframe_) use_fresh_keyframe();
+  if (keyframe_) motion_at_mark_ = motion_;
 }
 
 void TipTracker::unmark() {
-  state_->marked = false;
-  state_->motion_at_mark.reset();
+  marked_ = false;
+  motion_at_mark_.reset();
 }
 
 }  // namespace palpate

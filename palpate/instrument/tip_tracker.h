@@ -1,70 +1,83 @@
 #pragma once
 
-#include <filesystem>
-#include <map>
-#include <memory>
+#include <array>
 #include <optional>
-#include <string>
 
-#include "palpate/core/geometry.h"
-#include "palpate/core/settings.h"
-#include "palpate/stereo/rig.h"
+#include "palpate/instrument/eye_lag.h"
+#include "palpate/instrument/instrument_tracker.h"
+#include "palpate/instrument/rigid_motion.h"
+#include "palpate/instrument/tip_filter.h"
+#include "palpate/instrument/tip_track.h"
 
 namespace palpate {
 
-/// `instrument` of the scene file.
-struct InstrumentOptions {
-  std::string segmentation = "colour";  ///< how the instrument is found in the images
-  std::filesystem::path track;          ///< tip.csv instead of the images
+/// What one eye sees of one instrument in one frame.
+struct EyeView {
+  cv::Mat mask;                 ///< 255 = this instrument, of the whole image
+  std::optional<ImageTip> tip;  ///< nothing when the mask shows none
+  ImageLayers layers;           ///< around the tip, or around where it was last
 };
 
-void describe(Settings& settings, InstrumentOptions& options);
+/// Layers around a tip, as far as TipTracker looks.
+ImageLayers layers_around(const cv::Mat& bgr, const ImageTip& tip, const SegmentationModel& model);
 
-/// What one frame says about the tip, left camera frame.
-struct TipObservation {
-  bool visible = false;
-  Vec3 tip_mm = Vec3::Zero();  ///< far end of the jaws; filtered
-  Mat3 covariance_mm2 = Mat3::Identity();
-  Vec3 velocity_mm_per_s = Vec3::Zero();
-  std::optional<Vec3> since_mark_mm;  ///< displacement since `mark`, better known than the tip itself
-  Mat3 since_mark_covariance_mm2 = Mat3::Identity();
-  std::optional<bool> closed;  ///< jaws hold, where a tip track says so
-  cv::Mat left_mask;           ///< 255 = instrument, rectified left image; empty with a tip track
-  cv::Mat right_mask;
-  bool eyes_out_of_step = false;  ///< the eyes show different moments: whatever moves is misplaced
-};
+/// Whether two tips can be the same one seen by the left and the right eye.
+bool can_be_one_tip(const ImageTip& left, const ImageTip& right);
 
-/// p of the paper: segmentation, tip in both images, pyramidal Lucas-Kanade between frames, epipolar match,
+/// Follows one instrument in 3D, told where it is in each image: Lucas-Kanade against a keyframe, epipolar match,
 /// triangulation, Kalman filter.
 class TipTracker {
  public:
-  /// `static_frame`: the rectified pair of the map frame; `organ_mask`: 255 = surely tissue in its left image.
-  TipTracker(const InstrumentOptions& options, const Rectification& rectification, const RectifiedPair& static_frame,
-             const cv::Mat& organ_mask);
-  ~TipTracker();
-  TipTracker(TipTracker&&) noexcept;
+  explicit TipTracker(const Rectification& rectification) : rectification_(rectification) {}
 
-  /// Frames in order of time. A frame in which the tip cannot be found is `visible = false`, never a guess.
-  TipObservation update(const RectifiedPair& pair);
+  /// `seconds` since the last frame, `index` of this one. `touches_another`: the masks do not tell where this one ends,
+  /// so that its texture has to be trusted for longer.
+  TipObservation update(const EyeView& left, const EyeView& right, int index, double seconds, bool touches_another);
 
-  /// Takes the frame of the last update as the zero of `since_mark_mm` (onset of a contact).
+  /// The same from a tip track.
+  TipObservation update(const TipTrack& track, int index);
+
+  /// Takes the frame of the last update as the zero of `since_mark_mm`.
   void mark();
   void unmark();
 
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
+  bool visible() const { return visible_; }
+  bool marked() const { return marked_; }
+  bool eyes_out_of_step() const { return eyes_out_of_step_; }
+  /// In the left (0) or right (1) image, as last seen.
+  const std::optional<ImageTip>& last_tip(size_t eye) const { return last_tips_[eye]; }
+  /// Where the visible tip is expected in an image after `seconds`.
+  cv::Point2d expected_px(size_t eye, double seconds) const;
 
-/// tip.csv: frame,time_s,x_mm,y_mm,z_mm[,closed], left camera frame. Throws BadInput with file and line.
-struct TipTrack {
-  struct Row {
-    double time_s = 0;
-    Vec3 tip_mm = Vec3::Zero();
-    std::optional<bool> closed;
-  };
-  std::map<int, Row> rows;  ///< by frame number
+ private:
+  struct Detection;
+  std::optional<Detection> detect(const EyeView& left, const EyeView& right) const;
+  std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
+                                                   const std::optional<Detection>& detection, double seconds) const;
+  void advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
+               double seconds);
+  void renew_keyframe(std::optional<Detection> detection, const EyeView& right);
+  void use_fresh_keyframe();
+  void lose();
+  void report_since_mark(TipObservation& observation) const;
+
+  Rectification rectification_;
+  TipFilter filter_;
+  EyeLag eye_lag_;
+  bool eyes_out_of_step_ = false;                     // as last found; it stays so while nothing moves
+  std::array<std::optional<ImageTip>, 2> last_tips_;  // where to look when a mask shows none
+  std::optional<InstrumentKeyframe> keyframe_;
+  std::optional<InstrumentKeyframe> fresh_keyframe_;  // of the last frame, should it be marked
+  RigidMotion motion_;                                // since the keyframe, as last measured
+  int frames_alone_ = 0;
+  int rejected_ = 0;
+  bool visible_ = false;
+
+  bool marked_ = false;
+  bool from_track_ = false;
+  std::optional<RigidMotion> motion_at_mark_;  // since the keyframe; none when the mark came without a keyframe
+  Vec3 tip_at_mark_mm_ = Vec3::Zero();         // rectified frame, or left camera frame with a track
+  Mat3 covariance_at_mark_mm2_ = Mat3::Zero();
 };
-TipTrack read_tip_track(const std::filesystem::path& file);
 
 }  // namespace palpate

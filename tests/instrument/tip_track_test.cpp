@@ -4,7 +4,8 @@
 #include <fstream>
 
 #include "palpate/core/errors.h"
-#include "palpate/instrument/tip_tracker.h"
+#include "palpate/instrument/instrument_tracker.h"
+#include "palpate/instrument/tip_track.h"
 #include "tests/instrument/drawn_scene.h"
 
 namespace palpate {
@@ -65,13 +66,13 @@ TEST_F(TipTrackFile, ReplacesTheImages) {
   InstrumentOptions options;
   options.track = write("frame,time_s,x_mm,y_mm,z_mm,closed\n1,0.04,1,2,80,0\n2,0.08,1.2,2,80,1\n4,0.16,2,2,81,1\n");
   const auto scene = test::draw_pair({.instrument = false}, {}, 0);
-  TipTracker tracker(options, test::drawn_rectification(), scene, {});
+  InstrumentTracker tracker(options, test::drawn_rectification(), scene, {});
   RectifiedPair pair = scene;
   std::vector<TipObservation> seen;
   for (int frame = 0; frame < 5; ++frame) {
     pair.index = frame;
-    seen.push_back(tracker.update(pair));
-    if (frame == 2) tracker.mark();
+    seen.push_back(tracker.update(pair).tips[0]);
+    if (frame == 2) tracker.mark(0);
   }
   EXPECT_FALSE(seen[0].visible);
   EXPECT_FALSE(seen[3].visible);

@@ -1,4 +1,4 @@
-#include "palpate/instrument/tip_tracker.h"
+#include "palpate/instrument/instrument_tracker.h"
 
 #include <gtest/gtest.h>
 
@@ -15,13 +15,13 @@
 namespace palpate {
 namespace {
 
-TEST(TipTracker, FollowsADrawnInstrument) {
+TEST(InstrumentTracker, FollowsADrawnInstrument) {
   test::DrawnInstrument instrument;
   const Vec3 start = instrument.tip_mm;
-  TipTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
   for (int frame = 1; frame < 10; ++frame) {
     instrument.tip_mm = start + Vec3(-1.0, 0.3, 0.4) * frame;
-    const auto seen = tracker.update(test::draw_pair({}, instrument, frame));
+    const auto seen = tracker.update(test::draw_pair({}, instrument, frame)).tips[0];
     ASSERT_TRUE(seen.visible) << "frame " << frame;
     const Vec3 error = seen.tip_mm - instrument.tip_mm;
     EXPECT_LT(error.head<2>().norm(), 0.6) << "frame " << frame;
@@ -32,37 +32,37 @@ TEST(TipTracker, FollowsADrawnInstrument) {
   }
 }
 
-TEST(TipTracker, MeasuresTheDisplacementSinceTheMarkMuchBetterThanTheTip) {
+TEST(InstrumentTracker, MeasuresTheDisplacementSinceTheMarkMuchBetterThanTheTip) {
   test::DrawnInstrument instrument;
   const Vec3 start = instrument.tip_mm;
   const Vec3 direction = instrument.direction;
-  TipTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
   for (int frame = 1; frame < 4; ++frame) tracker.update(test::draw_pair({}, instrument, frame));
-  tracker.mark();
+  tracker.mark(0);
   int frame = 4;
   for (const Vec3& moved : {Vec3(0, 0, 0), Vec3(0.4, 0, -0.8), Vec3(1, 0.5, -2), Vec3(1.5, 1, -3.5), Vec3(0, 0, 2)}) {
     instrument.tip_mm = start + moved;
     // A little turn about the tip must not be taken for a displacement of it.
     instrument.direction = (direction + 0.004 * moved.norm() * Vec3(0, 1, 0)).normalized();
-    const auto seen = tracker.update(test::draw_pair({}, instrument, frame++));
+    const auto seen = tracker.update(test::draw_pair({}, instrument, frame++)).tips[0];
     ASSERT_TRUE(seen.since_mark_mm);
     const Vec3 error = *seen.since_mark_mm - moved;
     EXPECT_LT(error.head<2>().norm(), 0.1) << "moved by " << moved.transpose();
     EXPECT_LT(std::abs(error.z()), 0.3) << "moved by " << moved.transpose();
   }
-  tracker.unmark();
-  EXPECT_FALSE(tracker.update(test::draw_pair({}, instrument, frame)).since_mark_mm);
+  tracker.unmark(0);
+  EXPECT_FALSE(tracker.update(test::draw_pair({}, instrument, frame)).tips[0].since_mark_mm);
 }
 
-TEST(TipTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
+TEST(InstrumentTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
   const test::DrawnInstrument instrument;
-  TipTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
-  EXPECT_FALSE(tracker.update(test::draw_pair({.instrument = false}, {}, 0)).visible);
-  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 1)).visible);
-  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 2)).visible);
-  tracker.mark();
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  EXPECT_FALSE(tracker.update(test::draw_pair({.instrument = false}, {}, 0)).tips[0].visible);
+  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 1)).tips[0].visible);
+  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 2)).tips[0].visible);
+  tracker.mark(0);
   for (int frame = 3; frame < 6; ++frame) {
-    const auto seen = tracker.update(test::draw_pair({.instrument = false}, {}, frame));
+    const auto seen = tracker.update(test::draw_pair({.instrument = false}, {}, frame)).tips[0];
     EXPECT_FALSE(seen.visible);
     EXPECT_FALSE(seen.since_mark_mm);
   }
@@ -70,7 +70,7 @@ TEST(TipTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
   elsewhere.tip_mm += Vec3(6, -8, -4);
   int found = 0;
   for (int frame = 6; frame < 9; ++frame) {
-    const auto seen = tracker.update(test::draw_pair({}, elsewhere, frame));
+    const auto seen = tracker.update(test::draw_pair({}, elsewhere, frame)).tips[0];
     if (!seen.visible) continue;
     ++found;
     EXPECT_LT((seen.tip_mm - elsewhere.tip_mm).norm(), 1.5);
@@ -78,26 +78,26 @@ TEST(TipTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
   EXPECT_GE(found, 1);
 }
 
-TEST(TipTracker, SaysNothingOnBlackFramesAndGoesOnAfterwards) {
+TEST(InstrumentTracker, SaysNothingOnBlackFramesAndGoesOnAfterwards) {
   const test::DrawnInstrument instrument;
-  TipTracker tracker({}, test::drawn_rectification(), test::draw_pair({}, instrument, 0), {});
-  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 0)).visible);
-  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 1)).visible);
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({}, instrument, 0), {});
+  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 0)).tips[0].visible);
+  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 1)).tips[0].visible);
   RectifiedPair black = test::draw_pair({}, instrument, 2);
   black.left.setTo(0);
   black.right.setTo(0);
-  EXPECT_FALSE(tracker.update(black).visible);
-  const auto seen = tracker.update(test::draw_pair({}, instrument, 3));
+  EXPECT_FALSE(tracker.update(black).tips[0].visible);
+  const auto seen = tracker.update(test::draw_pair({}, instrument, 3)).tips[0];
   EXPECT_TRUE(seen.visible);
   EXPECT_LT((seen.tip_mm - instrument.tip_mm).norm(), 1.5);
 }
 
-TEST(TipTracker, SeesNoInstrumentInHighlights) {
-  TipTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false, .highlights = true}, {}, 0),
-                     {});
+TEST(InstrumentTracker, SeesNoInstrumentInHighlights) {
+  InstrumentTracker tracker({}, test::drawn_rectification(),
+                            test::draw_pair({.instrument = false, .highlights = true}, {}, 0), {});
   for (int frame = 0; frame < 5; ++frame) {
     const test::DrawnScene scene{.instrument = false, .highlights = true, .highlight_shift_px = 4.0 * frame};
-    EXPECT_FALSE(tracker.update(test::draw_pair(scene, {}, frame)).visible);
+    EXPECT_FALSE(tracker.update(test::draw_pair(scene, {}, frame)).tips[0].visible);
   }
 }
 
@@ -147,12 +147,12 @@ TEST_P(RenderedTip, IsFollowedThroughTheWholeSequence) {
   ASSERT_EQ(sequence.pairs.size(), sequence.tip_mm.size());
   const int first_contact = 15, last_contact = 89;
 
-  TipTracker tracker({}, rendered_rectification(), sequence.pairs[0], {});
+  InstrumentTracker tracker({}, rendered_rectification(), sequence.pairs[0], {});
   int visible = 0, marked = 0;
   Vec3 tip_squares = Vec3::Zero(), marked_squares = Vec3::Zero();
   double consistency = 0;
   for (size_t i = 0; i < sequence.pairs.size(); ++i) {
-    const auto seen = tracker.update(sequence.pairs[i]);
+    const auto seen = tracker.update(sequence.pairs[i]).tips[0];
     const int frame = static_cast<int>(i);
     if (seen.visible) {
       const Vec3 error = seen.tip_mm - sequence.tip_mm[i];
@@ -165,8 +165,8 @@ TEST_P(RenderedTip, IsFollowedThroughTheWholeSequence) {
       marked_squares += error.cwiseAbs2();
       ++marked;
     }
-    if (frame == first_contact) tracker.mark();
-    if (frame == last_contact) tracker.unmark();
+    if (frame == first_contact) tracker.mark(0);
+    if (frame == last_contact) tracker.unmark(0);
   }
   EXPECT_GE(visible, 95);
   const Vec3 tip_rmse = (tip_squares / visible).cwiseSqrt();
@@ -180,12 +180,12 @@ TEST_P(RenderedTip, IsFollowedThroughTheWholeSequence) {
 
 INSTANTIATE_TEST_SUITE_P(Reference, RenderedTip, ::testing::Values("rendered_uterus", "rendered_liver"));
 
-TEST(TipTracker, SeesNoInstrumentOnRealTissueWithoutOne) {
+TEST(InstrumentTracker, SeesNoInstrumentOnRealTissueWithoutOne) {
   PALPATE_NEEDS_REFERENCE("surgt_tissue");
   const auto folder = test::reference_data() / "surgt_tissue";
   cv::VideoCapture video((folder / "video.mp4").string());
   const Rectification rectification = make_rectification(read_rig(folder / "calibration.yaml"), {1280, 1024});
-  std::unique_ptr<TipTracker> tracker;
+  std::unique_ptr<InstrumentTracker> tracker;
   cv::Mat both;
   int frames = 0;
   for (; video.read(both); ++frames) {
@@ -195,13 +195,13 @@ TEST(TipTracker, SeesNoInstrumentOnRealTissueWithoutOne) {
     frame.left = both.colRange(0, 1280).clone();
     frame.right = both.colRange(1280, 2560).clone();
     const RectifiedPair pair = rectify(rectification, frame);
-    if (!tracker) tracker = std::make_unique<TipTracker>(InstrumentOptions{}, rectification, pair, cv::Mat());
-    EXPECT_FALSE(tracker->update(pair).visible) << "frame " << frames;
+    if (!tracker) tracker = std::make_unique<InstrumentTracker>(InstrumentOptions{}, rectification, pair, cv::Mat());
+    EXPECT_FALSE(tracker->update(pair).tips[0].visible) << "frame " << frames;
   }
   EXPECT_EQ(frames, 10);
 }
 
-TEST(TipTracker, SeesNoInstrumentOnASiliconeHeart) {
+TEST(InstrumentTracker, SeesNoInstrumentOnASiliconeHeart) {
   PALPATE_NEEDS_REFERENCE("hamlyn_heart");
   const auto folder = test::reference_data() / "hamlyn_heart";
   RectifiedPair pair;
@@ -213,8 +213,8 @@ TEST(TipTracker, SeesNoInstrumentOnASiliconeHeart) {
   rectification.principal_x_px = 180;
   rectification.principal_y_px = 144;
   rectification.baseline_mm = 5.5;
-  TipTracker tracker({}, rectification, pair, {});
-  EXPECT_FALSE(tracker.update(pair).visible);
+  InstrumentTracker tracker({}, rectification, pair, {});
+  EXPECT_FALSE(tracker.update(pair).tips[0].visible);
 }
 
 }  // namespace

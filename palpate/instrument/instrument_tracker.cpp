@@ -1,0 +1,270 @@
+#include "palpate/instrument/instrument_tracker.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <array>
+
+#include "palpate/core/errors.h"
+#include "palpate/instrument/find_tip.h"
+#include "palpate/instrument/segment.h"
+#include "palpate/instrument/tip_tracker.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr int kKeepsItsEntryAfter = 10;  // frames seen
+constexpr int kBeforeASecondIsBelieved = 3;
+constexpr double kSameDirection = 0.5;  // cosine between shafts of one instrument that left and came back
+constexpr double kFarthest_px = 120;    // between where a tip is expected and where it is, if its shaft has turned
+constexpr double kTurnedShaft = 0.7;    // cosine
+constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
+
+/// One eye in one frame.
+struct SeenByEye {
+  cv::Mat mask;
+  std::vector<ImageInstrument> instruments;
+  std::array<int, kMostInstruments> of_tracker;  ///< which of `instruments`, or -1
+};
+
+/// Share of the end of a shaft, where it is expected, that lies on a mask whose corner is at `origin`.
+double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& expected) {
+  int on = 0;
+  constexpr int kSteps = 8;
+  for (int i = 1; i <= kSteps; ++i) {
+    const cv::Point at(expected.tip_px - 0.2 * i * expected.width_px * expected.axis - cv::Point2d(origin));
+    on += cv::Rect({}, mask.size()).contains(at) && mask.at<uchar>(at) != 0;
+  }
+  return static_cast<double>(on) / kSteps;
+}
+
+}  // namespace
+
+struct InstrumentTracker::State {
+  Rectification rectification;
+  std::array<SegmentationModel, 2> models;
+  std::vector<TipTrack> tracks;
+  std::vector<TipTracker> trackers;
+  std::array<int, kMostInstruments> frames_seen{};
+  int second_seen = 0;  ///< frames, one after the other, in which a further instrument asked for an entry
+  std::optional<double> last_time_s;
+
+  SeenByEye see(const cv::Mat& bgr, size_t eye) const;
+  std::optional<ImageTip> expected(size_t tracker, size_t eye, double seconds) const;
+  void follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const;
+  std::array<bool, kMostInstruments> part_touching(std::array<SeenByEye, 2>& seen, double seconds) const;
+  void begin_further(std::array<SeenByEye, 2>& seen);
+  std::optional<size_t> entry_for(const ImageTip& left) const;
+  EyeView view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye, double seconds) const;
+  bool keeps_its_entry(size_t tracker) const {
+    return trackers[tracker].marked() || frames_seen[tracker] >= kKeepsItsEntryAfter;
+  }
+  bool one_is_visible() const {
+    return std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
+  }
+};
+
+SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) const {
+  SeenByEye seen;
+  seen.of_tracker.fill(-1);
+  seen.mask = segment_instrument(bgr, models[eye]);
+  seen.instruments = find_instruments(seen.mask, models[eye].picture_area);
+  return seen;
+}
+
+std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_t eye, double seconds) const {
+  std::optional<ImageTip> tip = trackers[tracker].last_tip(eye);
+  if (tip && trackers[tracker].visible()) tip->tip_px = trackers[tracker].expected_px(eye, seconds);
+  return tip;
+}
+
+/// Gives every visible instrument the one of each eye that lies nearest to where it is expected.
+void InstrumentTracker::State::follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const {
+  for (size_t eye = 0; eye < 2; ++eye) {
+    struct Pair {
+      double distance_px;
+      size_t tracker;
+      int instrument;
+    };
+    std::vector<Pair> pairs;
+    for (size_t t = 0; t < kMostInstruments; ++t) {
+      const auto tip = expected(t, eye, seconds);
+      if (!tip || !trackers[t].visible()) continue;
+      for (size_t i = 0; i < seen[eye].instruments.size(); ++i) {
+        const ImageTip& candidate = seen[eye].instruments[i].tip;
+        const double distance_px = cv::norm(candidate.tip_px - tip->tip_px), cosine = candidate.axis.dot(tip->axis);
+        if (distance_px > kFarthest_px && cosine < kTurnedShaft) continue;
+        pairs.push_back({distance_px + kFarthest_px * (1 - cosine), t, static_cast<int>(i)});
+      }
+    }
+    std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.distance_px < b.distance_px; });
+    auto& of_tracker = seen[eye].of_tracker;
+    for (const Pair& pair : pairs)
+      if (of_tracker[pair.tracker] < 0 &&
+          std::find(of_tracker.begin(), of_tracker.end(), pair.instrument) == of_tracker.end())
+        of_tracker[pair.tracker] = pair.instrument;
+  }
+}
+
+/// Which instruments touch another one in either image, so that the outline of their common mask is neither's. They
+/// lose what they were given there.
+std::array<bool, kMostInstruments> InstrumentTracker::State::part_touching(std::array<SeenByEye, 2>& seen,
+                                                                           double seconds) const {
+  std::array<bool, kMostInstruments> touching{};
+  if (!std::all_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); })) return touching;
+  for (size_t eye = 0; eye < 2; ++eye) {
+    std::array<int, kMostInstruments>& given = seen[eye].of_tracker;
+    std::array<bool, kMostInstruments> here{};
+    for (size_t t = 0; t < kMostInstruments; ++t) {
+      if (given[t] >= 0) continue;
+      const auto tip = expected(t, eye, seconds);
+      if (!tip || share_on(seen[eye].mask, {0, 0}, *tip) < kTouchingShare) continue;
+      here[t] = true;
+      for (size_t other = 0; other < kMostInstruments; ++other) {
+        if (given[other] < 0) continue;
+        const ImageInstrument& its = seen[eye].instruments[static_cast<size_t>(given[other])];
+        if (share_on(its.mask, its.box.tl(), *tip) >= kTouchingShare) here[other] = true;
+      }
+    }
+    for (size_t t = 0; t < kMostInstruments; ++t) {
+      if (!here[t]) continue;
+      given[t] = -1;
+      touching[t] = true;
+    }
+  }
+  return touching;
+}
+
+/// The entry for an instrument that comes into view: its own if it was here before, else a free one.
+std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left) const {
+  std::optional<size_t> own, free, any;
+  double best = kSameDirection, best_of_any = -2;
+  for (size_t t = 0; t < kMostInstruments; ++t) {
+    if (trackers[t].visible()) continue;
+    if (!keeps_its_entry(t)) {
+      if (!free) free = t;
+      continue;
+    }
+    const double cosine = left.axis.dot(trackers[t].last_tip(0)->axis);
+    if (cosine > best) best = cosine, own = t;
+    if (cosine > best_of_any) best_of_any = cosine, any = t;
+  }
+  return own ? own : free ? free : any;
+}
+
+/// Gives what no instrument was given to those that are not visible.
+void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
+  const auto is_given = [](const SeenByEye& eye, size_t i) {
+    return std::find(eye.of_tracker.begin(), eye.of_tracker.end(), static_cast<int>(i)) != eye.of_tracker.end();
+  };
+  const bool beside_another = one_is_visible();
+  bool asks = false;
+  for (size_t l = 0; l < seen[0].instruments.size(); ++l)
+    for (size_t r = 0; r < seen[1].instruments.size(); ++r) {
+      const ImageTip& left = seen[0].instruments[l].tip;
+      if (is_given(seen[0], l) || is_given(seen[1], r) || !can_be_one_tip(left, seen[1].instruments[r].tip)) continue;
+      const auto entry = entry_for(left);
+      if (!entry) return;
+      if (beside_another && !keeps_its_entry(*entry)) {
+        asks = true;
+        if (second_seen + 1 < kBeforeASecondIsBelieved) continue;
+      }
+      if (!keeps_its_entry(*entry)) {
+        trackers[*entry] = TipTracker(rectification);
+        frames_seen[*entry] = 0;
+      }
+      seen[0].of_tracker[*entry] = static_cast<int>(l);
+      seen[1].of_tracker[*entry] = static_cast<int>(r);
+    }
+  second_seen = asks ? second_seen + 1 : 0;
+}
+
+EyeView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye,
+                                       double seconds) const {
+  EyeView result;
+  result.mask = seen.mask;
+  for (size_t other = 0; other < kMostInstruments; ++other) {
+    if (other == tracker || seen.of_tracker[other] < 0) continue;
+    const ImageInstrument& its = seen.instruments[static_cast<size_t>(seen.of_tracker[other])];
+    result.mask = result.mask.clone();
+    result.mask(its.box).setTo(0, its.mask);
+  }
+  if (seen.of_tracker[tracker] >= 0) result.tip = seen.instruments[static_cast<size_t>(seen.of_tracker[tracker])].tip;
+  const std::optional<ImageTip> look_at = result.tip ? result.tip : expected(tracker, eye, seconds);
+  if (look_at) result.layers = layers_around(bgr, *look_at, models[eye]);
+  return result;
+}
+
+void describe(Settings& settings, InstrumentOptions& options) {
+  settings.text("segmentation", options.segmentation, "how the instrument is found in the images: colour");
+  settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
+  settings.path("track_2", options.track_2, "the same for a second instrument, with track");
+  settings.after_reading([&options] {
+    if (!options.track_2.empty() && options.track.empty())
+      throw BadInput("instrument.track_2 is given without instrument.track, expected both or only track");
+    if (options.segmentation == "colour") return;
+    if (options.segmentation.ends_with(".onnx"))
+      throw BadInput(fmt::format("instrument.segmentation is '{}': networks are not there yet, expected colour",
+                                 options.segmentation));
+    throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour", options.segmentation));
+  });
+}
+
+InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rectification& rectification,
+                                     const RectifiedPair& static_frame, const cv::Mat& organ_mask)
+    : state_(std::make_unique<State>()) {
+  state_->rectification = rectification;
+  state_->trackers.assign(kMostInstruments, TipTracker(rectification));
+  for (const std::filesystem::path& track : {options.track, options.track_2})
+    if (!track.empty()) state_->tracks.push_back(read_tip_track(track));
+  tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
+                       [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); });
+}
+
+InstrumentTracker::~InstrumentTracker() = default;
+InstrumentTracker::InstrumentTracker(InstrumentTracker&&) noexcept = default;
+
+InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
+  State& s = *state_;
+  InstrumentObservations observations;
+  observations.tips.resize(kMostInstruments);
+  const std::array<const cv::Mat*, 2> images = {&pair.left, &pair.right};
+  std::array<SeenByEye, 2> seen;
+  const auto see = [&](size_t eye) {
+    if (!images[eye]->empty()) seen[eye] = s.see(*images[eye], eye);
+  };
+  tbb::parallel_invoke([&] { see(0); }, [&] { see(1); });
+  observations.left_mask = seen[0].mask;
+  observations.right_mask = seen[1].mask;
+  for (size_t t = 0; t < s.tracks.size(); ++t) observations.tips[t] = s.trackers[t].update(s.tracks[t], pair.index);
+  if (!s.tracks.empty()) return observations;
+
+  const double seconds = s.last_time_s ? std::max(pair.time_s - *s.last_time_s, 1e-3) : 0.04;
+  s.last_time_s = pair.time_s;
+  s.follow_visible(seen, seconds);
+  const auto touching = s.part_touching(seen, seconds);
+  s.begin_further(seen);
+  for (size_t t = 0; t < kMostInstruments; ++t) {
+    TipTracker& tracker = s.trackers[t];
+    if (!tracker.visible() && seen[0].of_tracker[t] < 0) continue;
+    std::array<EyeView, 2> views;
+    const auto view = [&](size_t eye) { views[eye] = s.view(*images[eye], seen[eye], t, eye, seconds); };
+    tbb::parallel_invoke([&] { view(0); }, [&] { view(1); });
+    observations.tips[t] = tracker.update(views[0], views[1], pair.index, seconds, touching[t]);
+    if (tracker.visible()) ++s.frames_seen[t];
+    if (tracker.visible() && tracker.eyes_out_of_step()) observations.eyes_out_of_step = true;
+  }
+  return observations;
+}
+
+void InstrumentTracker::mark(size_t instrument) {
+  state_->trackers.at(instrument).mark();
+}
+
+void InstrumentTracker::unmark(size_t instrument) {
+  state_->trackers.at(instrument).unmark();
+}
+
+}  // namespace palpate
