@@ -23,6 +23,7 @@
 #include "palpate/feedback/report.h"
 #include "palpate/feedback/video_writer.h"
 #include "palpate/feedback/warnings.h"
+#include "palpate/instrument/tip_track.h"
 
 namespace palpate::app {
 
