@@ -46,25 +46,31 @@ struct InstrumentTracker::State {
   Rectification rectification;
   std::array<SegmentationModel, 2> models;
   std::vector<TipTrack> tracks;
+  double time_offset_s = 0;
   std::vector<TipTracker> trackers;
   std::array<int, kMostInstruments> frames_seen{};
   int second_seen = 0;  ///< frames, one after the other, in which a further instrument asked for an entry
   std::optional<double> last_time_s;
 
+  std::optional<TipTrack::Row> row_of(const TipTrack& track, const RectifiedPair& pair) const;
   SeenByEye see(const cv::Mat& bgr, size_t eye) const;
   std::optional<ImageTip> expected(size_t tracker, size_t eye, double seconds) const;
   void follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const;
   std::array<bool, kMostInstruments> part_touching(std::array<SeenByEye, 2>& seen, double seconds) const;
   void begin_further(std::array<SeenByEye, 2>& seen);
-  std::optional<size_t> entry_for(const ImageTip& left) const;
+  std::optional<size_t> entry_for(const ImageTip& left, const SeenByEye& seen_left) const;
   EyeView view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye, double seconds) const;
   bool keeps_its_entry(size_t tracker) const {
     return trackers[tracker].marked() || frames_seen[tracker] >= kKeepsItsEntryAfter;
   }
-  bool one_is_visible() const {
-    return std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
-  }
 };
+
+std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& track, const RectifiedPair& pair) const {
+  if (time_offset_s != 0) return row_at(track, pair.time_s + time_offset_s);
+  const auto row = track.rows.find(pair.index);
+  if (row == track.rows.end()) return {};
+  return row->second;
+}
 
 SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) const {
   SeenByEye seen;
@@ -138,11 +144,11 @@ std::array<bool, kMostInstruments> InstrumentTracker::State::part_touching(std::
 }
 
 /// The entry for an instrument that comes into view: its own if it was here before, else a free one.
-std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left) const {
+std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left, const SeenByEye& seen_left) const {
   std::optional<size_t> own, free, any;
   double best = kSameDirection, best_of_any = -2;
   for (size_t t = 0; t < kMostInstruments; ++t) {
-    if (trackers[t].visible()) continue;
+    if (trackers[t].visible() || seen_left.of_tracker[t] >= 0) continue;
     if (!keeps_its_entry(t)) {
       if (!free) free = t;
       continue;
@@ -159,13 +165,13 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
   const auto is_given = [](const SeenByEye& eye, size_t i) {
     return std::find(eye.of_tracker.begin(), eye.of_tracker.end(), static_cast<int>(i)) != eye.of_tracker.end();
   };
-  const bool beside_another = one_is_visible();
+  bool beside_another = std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
   bool asks = false;
   for (size_t l = 0; l < seen[0].instruments.size(); ++l)
     for (size_t r = 0; r < seen[1].instruments.size(); ++r) {
       const ImageTip& left = seen[0].instruments[l].tip;
       if (is_given(seen[0], l) || is_given(seen[1], r) || !can_be_one_tip(left, seen[1].instruments[r].tip)) continue;
-      const auto entry = entry_for(left);
+      const auto entry = entry_for(left, seen[0]);
       if (!entry) return;
       if (beside_another && !keeps_its_entry(*entry)) {
         asks = true;
@@ -177,6 +183,7 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
       }
       seen[0].of_tracker[*entry] = static_cast<int>(l);
       seen[1].of_tracker[*entry] = static_cast<int>(r);
+      beside_another = true;
     }
   second_seen = asks ? second_seen + 1 : 0;
 }
@@ -201,6 +208,10 @@ void describe(Settings& settings, InstrumentOptions& options) {
   settings.text("segmentation", options.segmentation, "how the instrument is found in the images: colour");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
+  settings.group("camera_from_robot", "how the axes of the tracks lie; palpate check finds it",
+                 [&options](Settings& group) { describe(group, options.camera_from_robot); });
+  settings.number("time_offset_s", options.time_offset_s, {},
+                  "time of the tracks minus time of the video; other than 0, rows are found by time, not by frame");
   settings.after_reading([&options] {
     if (!options.track_2.empty() && options.track.empty())
       throw BadInput("instrument.track_2 is given without instrument.track, expected both or only track");
@@ -218,7 +229,8 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
   state_->rectification = rectification;
   state_->trackers.assign(kMostInstruments, TipTracker(rectification));
   for (const std::filesystem::path& track : {options.track, options.track_2})
-    if (!track.empty()) state_->tracks.push_back(read_tip_track(track));
+    if (!track.empty()) state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
+  state_->time_offset_s = options.time_offset_s;
   tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
                        [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); });
 }
@@ -238,7 +250,7 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   tbb::parallel_invoke([&] { see(0); }, [&] { see(1); });
   observations.left_mask = seen[0].mask;
   observations.right_mask = seen[1].mask;
-  for (size_t t = 0; t < s.tracks.size(); ++t) observations.tips[t] = s.trackers[t].update(s.tracks[t], pair.index);
+  for (size_t t = 0; t < s.tracks.size(); ++t) observations.tips[t] = s.trackers[t].update(s.row_of(s.tracks[t], pair));
   if (!s.tracks.empty()) return observations;
 
   const double seconds = s.last_time_s ? std::max(pair.time_s - *s.last_time_s, 1e-3) : 0.04;

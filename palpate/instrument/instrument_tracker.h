@@ -8,6 +8,7 @@
 
 #include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
+#include "palpate/instrument/hand_eye.h"
 #include "palpate/stereo/rig.h"
 
 namespace palpate {
@@ -20,6 +21,8 @@ struct InstrumentOptions {
   std::string segmentation = "colour";  ///< how instruments are found in the images
   std::filesystem::path track;          ///< tip.csv instead of the images
   std::filesystem::path track_2;        ///< the same for the second instrument
+  CameraFromRobot camera_from_robot;    ///< axes of the tracks
+  double time_offset_s = 0;             ///< track time minus video time; 0: rows are found by frame number
 };
 
 void describe(Settings& settings, InstrumentOptions& options);

@@ -87,7 +87,7 @@ std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, con
 
 TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int index, double seconds,
                                   bool touches_another) {
-  from_track_ = false;
+  last_row_.reset();
   std::optional<Detection> detection = detect(left, right);
   const auto measured = motion_since_keyframe(left, right, detection, seconds);
   frames_alone_ = detection ? 0 : frames_alone_ + 1;
@@ -122,21 +122,17 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
   return observation;
 }
 
-TipObservation TipTracker::update(const TipTrack& track, int index) {
-  from_track_ = true;
+TipObservation TipTracker::update(const std::optional<TipTrack::Row>& row) {
   TipObservation observation;
-  const auto row = track.rows.find(index);
-  visible_ = row != track.rows.end();
+  visible_ = row.has_value();
   if (!visible_) return observation;
   observation.visible = true;
-  observation.tip_mm = row->second.tip_mm;
-  observation.closed = row->second.closed;
+  observation.tip_mm = row->tip_mm;
+  observation.closed = row->closed;
   observation.covariance_mm2 = kBias_mm * kBias_mm * Mat3::Identity();
-  if (row != track.rows.begin()) {
-    const TipTrack::Row& before = std::prev(row)->second;
-    const double seconds = row->second.time_s - before.time_s;
-    if (seconds > 0) observation.velocity_mm_per_s = (row->second.tip_mm - before.tip_mm) / seconds;
-  }
+  if (last_row_ && row->time_s > last_row_->time_s)
+    observation.velocity_mm_per_s = (row->tip_mm - last_row_->tip_mm) / (row->time_s - last_row_->time_s);
+  last_row_ = row;
   filter_.start(observation.tip_mm, observation.covariance_mm2);
   if (marked_) {
     observation.since_mark_mm = observation.tip_mm - tip_at_mark_mm_;
@@ -263,7 +259,7 @@ void TipTracker::mark() {
   if (!visible_) return;
   tip_at_mark_mm_ = filter_.position_mm();
   covariance_at_mark_mm2_ = filter_.position_covariance_mm2();
-  if (from_track_) return;
+  if (last_row_) return;
   if (fresh_keyframe_) use_fresh_keyframe();
   if (keyframe_) motion_at_mark_ = motion_;
 }

@@ -34,8 +34,8 @@ class TipTracker {
   /// so that its texture has to be trusted for longer.
   TipObservation update(const EyeView& left, const EyeView& right, int index, double seconds, bool touches_another);
 
-  /// The same from a tip track.
-  TipObservation update(const TipTrack& track, int index);
+  /// The same from a row of a tip track, if there is one for this frame.
+  TipObservation update(const std::optional<TipTrack::Row>& row);
 
   /// Takes the frame of the last update as the zero of `since_mark_mm`.
   void mark();
@@ -74,7 +74,7 @@ class TipTracker {
   bool visible_ = false;
 
   bool marked_ = false;
-  bool from_track_ = false;
+  std::optional<TipTrack::Row> last_row_;      // with a track
   std::optional<RigidMotion> motion_at_mark_;  // since the keyframe; none when the mark came without a keyframe
   Vec3 tip_at_mark_mm_ = Vec3::Zero();         // rectified frame, or left camera frame with a track
   Mat3 covariance_at_mark_mm2_ = Mat3::Zero();

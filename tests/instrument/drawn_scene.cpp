@@ -19,6 +19,7 @@ struct Hit {
   double along_mm = 0;  ///< back from the tip
   double angle = 0;
   double facing = 0;  ///< cosine between normal and viewing ray
+  double distance_mm = 1e9;
 };
 
 double radius_at(const DrawnInstrument& i, double back) {
@@ -32,6 +33,14 @@ Hit cast(const DrawnInstrument& instrument, double eye_mm, double x, double y) {
   const Vec3 ray = Vec3((x - kCenterX) / kFocal, (y - kCenterY) / kFocal, 1).normalized();
   // The ball ends at the tip, so that the tip is the far end of the drawn body.
   const Vec3 end = instrument.tip_mm - instrument.tip_radius_mm * instrument.direction;
+  // Most rays pass even the endless shaft at a distance.
+  const Vec3 across = ray.cross(instrument.direction).normalized();
+  const double passed_by_mm = std::abs((end - origin).dot(across)) - instrument.radius_mm;
+  if (passed_by_mm > 1) {
+    Hit miss;
+    miss.missed_by_mm = passed_by_mm;
+    return miss;
+  }
   double t = 20, nearest = 1e9;
   for (int step = 0; step < 80 && t < 140; ++step) {
     const Vec3 p = origin + t * ray;
@@ -43,6 +52,7 @@ Hit cast(const DrawnInstrument& instrument, double eye_mm, double x, double y) {
       Hit hit;
       hit.hit = true;
       hit.along_mm = back;
+      hit.distance_mm = t;
       const Vec3 normal = (p - foot).normalized();
       const Vec3 side = instrument.direction.cross(Vec3::UnitZ()).normalized();
       hit.angle = std::atan2(normal.dot(side), normal.dot(side.cross(instrument.direction)));
@@ -54,6 +64,17 @@ Hit cast(const DrawnInstrument& instrument, double eye_mm, double x, double y) {
   Hit miss;
   miss.missed_by_mm = nearest;
   return miss;
+}
+
+/// The nearest hit; how far all were missed when there is none.
+Hit cast(const std::vector<DrawnInstrument>& instruments, double eye_mm, double x, double y) {
+  Hit nearest;
+  for (const DrawnInstrument& instrument : instruments) {
+    const Hit hit = cast(instrument, eye_mm, x, y);
+    if (hit.hit ? hit.distance_mm < nearest.distance_mm : !nearest.hit && hit.missed_by_mm < nearest.missed_by_mm)
+      nearest = hit;
+  }
+  return nearest;
 }
 
 double metal_grey(const Hit& hit) {
@@ -70,17 +91,17 @@ cv::Vec3d tissue_bgr(double x_mm, double y_mm) {
   return {48 * light, 52 * light, 135 * light};
 }
 
-cv::Mat draw_eye(const DrawnScene& scene, const DrawnInstrument& instrument, double eye_mm, int index) {
+cv::Mat draw_eye(const DrawnScene& scene, const std::vector<DrawnInstrument>& instruments, double eye_mm, int index) {
   cv::Mat image(kHeight, kWidth, CV_8UC3);
   cv::RNG noise(scene.noise_seed * 1000 + static_cast<unsigned>(index) * 2 + (eye_mm > 0));
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       cv::Vec3d sum(0, 0, 0);
-      const Hit centre = scene.instrument ? cast(instrument, eye_mm, x, y) : Hit();
+      const Hit centre = cast(instruments, eye_mm, x, y);
       const bool clear = !centre.hit && centre.missed_by_mm > 0.4;
       for (int sub = 0; sub < (clear ? 1 : 4); ++sub) {
         const double px = x + (clear ? 0 : (sub % 2) * 0.5 - 0.25), py = y + (clear ? 0 : (sub / 2) * 0.5 - 0.25);
-        const Hit hit = clear ? Hit() : cast(instrument, eye_mm, px, py);
+        const Hit hit = clear ? Hit() : cast(instruments, eye_mm, px, py);
         if (hit.hit)
           sum += cv::Vec3d::all(metal_grey(hit));
         else
@@ -110,13 +131,17 @@ Rectification drawn_rectification() {
   return rectification;
 }
 
-RectifiedPair draw_pair(const DrawnScene& scene, const DrawnInstrument& instrument, int index) {
+RectifiedPair draw_pair_of(const std::vector<DrawnInstrument>& instruments, const DrawnScene& scene, int index) {
   RectifiedPair pair;
   pair.index = index;
   pair.time_s = 0.04 * index;
-  pair.left = draw_eye(scene, instrument, 0, index);
-  pair.right = draw_eye(scene, instrument, kBaseline, index);
+  pair.left = draw_eye(scene, instruments, 0, index);
+  pair.right = draw_eye(scene, instruments, kBaseline, index);
   return pair;
+}
+
+RectifiedPair draw_pair(const DrawnScene& scene, const DrawnInstrument& instrument, int index) {
+  return draw_pair_of(scene.instrument ? std::vector{instrument} : std::vector<DrawnInstrument>{}, scene, index);
 }
 
 cv::Mat drawn_mask(const DrawnInstrument& instrument, double eye_mm) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "palpate/stereo/rig.h"
 
 namespace palpate::test {
@@ -25,6 +27,9 @@ struct DrawnScene {
 Rectification drawn_rectification();
 
 RectifiedPair draw_pair(const DrawnScene& scene, const DrawnInstrument& instrument, int index);
+
+/// Several instruments, the nearer before the farther.
+RectifiedPair draw_pair_of(const std::vector<DrawnInstrument>& instruments, const DrawnScene& scene, int index);
 
 /// 255 where the left eye sees the instrument, by ray casting.
 cv::Mat drawn_mask(const DrawnInstrument& instrument, double eye_mm = 0);
