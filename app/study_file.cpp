@@ -101,13 +101,29 @@ StudyValue number_value(double number) {
   return {fmt::format("{:g}", number), node, number};
 }
 
+const std::set<std::string> kSweepKeys = {"key", "unit", "logarithmic", "uncertainty", "times", "range", "values"};
+
+void reject_unknown(const std::filesystem::path& file, const YAML::Node& node, const std::set<std::string>& known,
+                    const std::string& where) {
+  for (const auto& entry : node)
+    if (const auto key = entry.first.as<std::string>(); !known.contains(key))
+      fail(file, entry.first, fmt::format("unknown key {} in {}", key, where));
+}
+
 void read_sweep(const Study& study, const YAML::Node& sweep, const YAML::Node& base, StudyExperiment& experiment) {
   const auto& file = study.file;
+  reject_unknown(file, sweep, kSweepKeys, "a sweep");
   experiment.key = required(file, sweep, "key");
   experiment.unit = value_of<std::string>(file, sweep, "unit", "");
   experiment.logarithmic = value_of(file, sweep, "logarithmic", false);
+  experiment.known = number_at(base, experiment.key);
+  if (sweep["uncertainty"]) {
+    experiment.uncertainty = value_of(file, sweep, "uncertainty", 0.0);
+    if (*experiment.uncertainty <= (experiment.logarithmic ? 1 : 0))
+      fail(file, sweep["uncertainty"], "uncertainty is above 0, on a logarithmic axis a factor above 1");
+  }
   if (sweep["times"]) {
-    const auto unit = number_at(base, experiment.key);
+    const auto unit = experiment.known;
     if (!unit) fail(file, sweep["times"], fmt::format("the scene gives no number for {}", experiment.key));
     std::vector<double> factors;
     if (sweep["times"].IsMap())
@@ -139,24 +155,39 @@ void keep_evenly(std::vector<StudyValue>& values, int count) {
   std::vector<StudyValue> kept;
   for (int i = 0; i < count; ++i)
     kept.push_back(values[static_cast<size_t>(count == 1 ? 0 : i * (all - 1) / (count - 1))]);
-  values = kept;
+  // Not copied: assigning to a YAML::Node changes every other that shares it.
+  values = std::move(kept);
 }
 
-const std::set<std::string> kExperimentKeys = {"name",  "title", "paper",           "says",    "scene", "set", "sweep",
-                                               "goals", "quick", "expects_warning", "estimate"};
+const std::set<std::string> kExperimentKeys = {"name", "title", "paper",    "says",  "why",   "scene",
+                                               "set",  "sweep", "estimate", "goals", "quick", "expects_warning"};
+/// Several scenes, one run each.
+void read_scenes(const Study& study, const YAML::Node& scenes, StudyExperiment& experiment) {
+  experiment.key = "scene";
+  for (const YAML::Node& scene : scenes) {
+    const std::filesystem::path file = study.file.parent_path() / scene.as<std::string>();
+    load(file);
+    experiment.values.push_back({file.stem().string(), scene, std::nullopt});
+  }
+  if (experiment.values.empty()) fail(study.file, scenes, "scene names no file");
+}
 
 StudyExperiment read_experiment(const Study& study, const YAML::Node& node) {
   const auto& file = study.file;
   if (!node.IsMap()) fail(file, node, "an experiment has keys: name, title, scene, ...");
-  for (const auto& entry : node)
-    if (!kExperimentKeys.contains(entry.first.as<std::string>()))
-      fail(file, entry.first, fmt::format("unknown key {} in an experiment", entry.first.as<std::string>()));
+  reject_unknown(file, node, kExperimentKeys, "an experiment");
   StudyExperiment experiment;
   experiment.name = required(file, node, "name");
   experiment.title = value_of(file, node, "title", experiment.name);
   experiment.paper = value_of<std::string>(file, node, "paper", "");
   experiment.says = value_of<std::string>(file, node, "says", "");
-  experiment.scene = file.parent_path() / required(file, node, "scene");
+  experiment.why = value_of<std::string>(file, node, "why", "");
+  if (node["scene"] && node["scene"].IsSequence()) {
+    if (node["sweep"]) fail(file, node["sweep"], "a sweep needs one scene, not a list");
+    read_scenes(study, node["scene"], experiment);
+  } else {
+    experiment.scene = file.parent_path() / required(file, node, "scene");
+  }
   if (node["set"]) experiment.set = node["set"];
   if (node["estimate"]) experiment.estimate = node["estimate"];
   experiment.goals = value_of(file, node, "goals", experiment.goals);
@@ -187,8 +218,11 @@ YAML::Node of_sequence(const YAML::Node& scene) {
   return kept;
 }
 
-void add_run(const StudyExperiment& experiment, const StudyValue* value, StudyPlan& plan) {
-  YAML::Node scene = load(experiment.scene);
+void add_run(const Study& study, const StudyExperiment& experiment, const StudyValue* value, StudyPlan& plan) {
+  const bool is_scene = experiment.key == "scene";
+  const std::filesystem::path file =
+      is_scene ? study.file.parent_path() / value->value.as<std::string>() : experiment.scene;
+  YAML::Node scene = load(file);
   const bool simulated = static_cast<bool>(scene["simulate"]);
   YAML::Node told(YAML::NodeType::Map);
   const auto tell = [&told](const std::string& key, const YAML::Node& to) {
@@ -201,14 +235,14 @@ void add_run(const StudyExperiment& experiment, const StudyValue* value, StudyPl
     tell(entry.first.as<std::string>(), entry.second);
   }
   for (const auto& entry : experiment.estimate) tell(entry.first.as<std::string>(), entry.second);
-  if (value) {
+  if (value && !is_scene) {
     if (experiment.key.starts_with("simulate.")) scene = with_key(scene, experiment.key, value->value);
     tell(experiment.key, value->value);
   }
-  StudyRun run{experiment.name + "/" + (value ? as_folder(value->label) : "run"), &experiment, value, "", told};
+  StudyRun run{experiment.name + "/" + (value ? as_folder(value->label) : "run"), &experiment, value, file, "", told};
   if (simulated) {
     const YAML::Node sequence = of_sequence(scene);
-    run.sequence = experiment.scene.stem().string() + "-" + fingerprint(YAML::Dump(sequence));
+    run.sequence = file.stem().string() + "-" + fingerprint(YAML::Dump(sequence));
     if (std::none_of(plan.sequences.begin(), plan.sequences.end(),
                      [&run](const StudySequence& known) { return known.name == run.sequence; }))
       plan.sequences.push_back({run.sequence, sequence});
@@ -247,8 +281,8 @@ Study read_study(const std::filesystem::path& file, bool quick) {
 StudyPlan plan_of(const Study& study) {
   StudyPlan plan;
   for (const StudyExperiment& experiment : study.experiments) {
-    if (experiment.values.empty()) add_run(experiment, nullptr, plan);
-    for (const StudyValue& value : experiment.values) add_run(experiment, &value, plan);
+    if (experiment.values.empty()) add_run(study, experiment, nullptr, plan);
+    for (const StudyValue& value : experiment.values) add_run(study, experiment, &value, plan);
   }
   return plan;
 }

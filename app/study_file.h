@@ -19,13 +19,15 @@ struct StudyValue {
 
 /// A scene that is simulated (or a recording), and how it is estimated: once, or for each value of one key.
 struct StudyExperiment {
-  std::string name, title, paper, says, unit;
-  std::filesystem::path scene;
-  YAML::Node set;       ///< dotted keys of the scene file and their values: for the sequence and the estimate
-  YAML::Node estimate;  ///< the same, told to the estimate alone
-  std::string key;      ///< what is swept; empty = one run
+  std::string name, title, paper, says, why, unit;
+  std::filesystem::path scene;  ///< empty where the values are scenes
+  YAML::Node set;               ///< dotted keys of the scene file and their values: for the sequence and the estimate
+  YAML::Node estimate;          ///< the same, told to the estimate alone
+  std::string key;              ///< what is swept; "scene" = the scene files themselves; empty = one run
   std::vector<StudyValue> values;
   bool logarithmic = false;             ///< axis of the sweep
+  std::optional<double> uncertainty;    ///< how wrong one is in practice: in its unit, on a logarithmic axis a factor
+  std::optional<double> known;          ///< what the scene says of the key
   std::map<std::string, double> goals;  ///< figure -> at most this magnitude
   std::optional<std::string> expects_warning;
 };
@@ -47,8 +49,9 @@ struct StudyRun {
   std::string name;  ///< experiment/label, unique
   const StudyExperiment* experiment = nullptr;
   const StudyValue* value = nullptr;  ///< null where nothing is swept
-  std::string sequence;               ///< empty: the scene names a recording
-  YAML::Node scene;                   ///< what the estimate is told beyond the scene of the sequence (all, without one)
+  std::filesystem::path scene_file;
+  std::string sequence;  ///< empty: the scene names a recording
+  YAML::Node scene;      ///< what the estimate is told beyond the scene of the sequence (all, without one)
 };
 
 struct StudyPlan {

@@ -16,13 +16,19 @@ namespace palpate::app {
 
 namespace {
 
+/// For exec; lives as long as `words`.
+std::vector<char*> pointers_to(std::vector<std::string>& words) {
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
 pid_t start(const StudyJob& job) {
   std::filesystem::create_directories(job.log.parent_path());
   std::vector<std::string> words = {"palpate"};
   words.insert(words.end(), job.arguments.begin(), job.arguments.end());
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
+  const std::vector<char*> arguments = pointers_to(words);
   const std::string log = job.log.string();
   const pid_t process = fork();
   if (process != 0) return process;
@@ -59,6 +65,18 @@ void run_jobs(const std::vector<StudyJob>& jobs, int at_once, const std::functio
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   }
+}
+
+bool run_program(const std::vector<std::string>& words, const std::filesystem::path& folder) {
+  std::vector<std::string> copies = words;
+  const std::vector<char*> arguments = pointers_to(copies);
+  const pid_t process = fork();
+  if (process == 0) {
+    if (chdir(folder.c_str()) == 0) execvp(arguments[0], arguments.data());
+    _exit(127);
+  }
+  int status = 0;
+  return process > 0 && waitpid(process, &status, 0) == process && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 }  // namespace palpate::app

@@ -18,4 +18,7 @@ struct StudyJob {
 /// Unfinished when the user interrupts; what is running then ends too.
 void run_jobs(const std::vector<StudyJob>& jobs, int at_once, const std::function<void(const StudyJob&, int)>& ended);
 
+/// Runs another program in a folder and waits for it; false where it is missing or fails.
+bool run_program(const std::vector<std::string>& words, const std::filesystem::path& folder);
+
 }  // namespace palpate::app

@@ -23,7 +23,7 @@ th,td{padding:.25rem .55rem;border-bottom:1px solid var(--line);text-align:right
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:var(--paper)}
 .good{color:var(--good)}.bad{color:var(--bad);font-weight:600}
 .charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem;margin:1rem 0}
-.chart{position:relative;height:19rem}video{width:100%;border-radius:.3rem}
+.chart{position:relative;height:19rem;min-width:0}video,img{width:100%;border-radius:.3rem}figure{margin:0}
 )css";
 
 constexpr const char* kScript = R"js(
@@ -97,20 +97,29 @@ function charts(parent, experiment) {
     const x = experiment.key + (experiment.unit ? ' (' + experiment.unit + ')' : ''), log = experiment.logarithmic;
     const over = name => done.filter(r => typeof r.figures[name] === 'number')
       .map(r => ({x: r.value, y: r.figures[name]}));
-    if (over('force_nrmse_pct').length)
-      chart(grid, 'Error of the force', x, 'NRMSE (% of the true peak)',
-        [{label: 'NRMSE', points: over('force_nrmse_pct'), dots: true}], log, log);
+    const errors = over('force_nrmse_pct'), wide = Math.max(...errors.map(p => p.y)) > 300;
+    const strong = over('gain').map(p => ({x: p.x, y: 100 * (p.y - 1)}));
+    const sets = [{label: 'error (RMS, of the true peak)', points: errors, dots: true}];
+    if (!wide && strong.length) sets.push({label: 'force too strong (+), too weak (-)', points: strong, dots: true});
+    const slope = experiment.sensitivity && experiment.sensitivity.text;
+    if (errors.length)
+      chart(grid, ['Error of the force'].concat(slope ? [slope] : []), x, '% of the true force', sets, log, log && wide);
     const peaks = [{label: 'estimated peak', points: over('peak_force_N'), dots: true}];
     if (over('true_peak_N').length)
       peaks.push({label: 'true peak', points: over('true_peak_N'), colour: '#777', dash: [5, 4], dots: true});
-    chart(grid, 'Peak force', x, 'force (N)', peaks, log, log);
+    chart(grid, 'Peak force', x, 'force (N)', peaks, log, log && wide);
     if (experiment.key === 'map.elements')
       chart(grid, 'Time per frame', x, 'median (ms)',
         [{label: 'frame', points: over('median_frame_ms'), dots: true}], log, false);
     return;
   }
+  (experiment.pictures || []).filter(p => p.data).forEach(p => {
+    const figure = add(grid, 'figure'), image = add(figure, 'img');
+    image.src = p.data; image.alt = p.caption;
+    add(figure, 'figcaption', p.caption, 'soft');
+  });
   const truth = done.find(r => r.series && r.series.truth);
-  const sets = done.filter(r => r.series && r.series.estimate)
+  const sets = done.filter(r => !r.real && r.series && r.series.estimate)
     .map(r => ({label: r.label || 'estimate', points: r.series.estimate}));
   if (truth) sets.push({label: 'truth', points: truth.series.truth, colour: '#777', dash: [5, 4]});
   if (sets.length) chart(grid, 'Force over time', 'time (s)', 'force (N)', sets, false, false);
@@ -122,12 +131,25 @@ function charts(parent, experiment) {
 
 add(root, 'h1', data.title);
 if (data.about) add(root, 'p', data.about);
+if (data.ranking && data.ranking.length) {
+  add(root, 'h2', 'What matters most');
+  add(root, 'p', 'The estimated force, when one setting is as wrong as it may well be and all else is known.');
+  const node = add(add(root, 'div', undefined, 'table'), 'table'), head = add(add(node, 'thead'), 'tr');
+  ['setting', 'how wrong it may be', 'force changes by', 'slope'].forEach(title => add(head, 'th', title));
+  const body = add(node, 'tbody');
+  data.ranking.forEach(r => {
+    const row = add(body, 'tr');
+    [r.title, r.uncertainty, (r.effect_pct > 0 ? '+' : '') + r.effect_pct.toFixed(1) + ' %', r.slope]
+      .forEach(text => add(row, 'td', text));
+  });
+}
 data.experiments.forEach(experiment => {
   const section = add(root, 'section');
   add(section, 'h2', experiment.title);
   if (experiment.paper) add(section, 'div', 'Paper: ' + experiment.paper, 'soft');
   if (experiment.says) add(section, 'p', experiment.says);
   if (experiment.findings) add(section, 'p', 'Measured: ' + experiment.findings);
+  if (experiment.why) add(section, 'p', 'Why: ' + experiment.why);
   charts(section, experiment);
   table(section, experiment);
 });
@@ -151,12 +173,12 @@ std::string study_page_html(const nlohmann::ordered_json& data) {
          "</script></body></html>\n";
 }
 
-std::string data_uri(const std::filesystem::path& video) {
-  std::ifstream stream(video, std::ios::binary);
+std::string data_uri(const std::filesystem::path& file, const std::string& type) {
+  std::ifstream stream(file, std::ios::binary);
   if (!stream) return "";
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text = "data:video/mp4;base64,";
+  std::string text = "data:" + type + ";base64,";
   for (size_t i = 0; i < bytes.size(); i += 3) {
     const auto byte = [&bytes, i](size_t k) {
       return i + k < bytes.size() ? static_cast<unsigned>(static_cast<unsigned char>(bytes[i + k])) : 0U;

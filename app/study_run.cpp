@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <fstream>
 
 #include "app/run.h"
@@ -44,6 +45,38 @@ YAML::Node merged(const YAML::Node& base, const YAML::Node& told) {
   return result;
 }
 
+/// A recording that a scene finds by an environment variable may be missing on this machine: the first such path that
+/// leads nowhere, in words; empty where all are there.
+std::string missing_recording(const YAML::Node& scene) {
+  const YAML::Node recording = scene["recording"];
+  for (const char* key : {"left", "right", "stereo", "calibration"}) {
+    if (!recording.IsMap() || !recording[key]) continue;
+    const auto path = recording[key].as<std::string>();
+    const size_t end = path.find('}');
+    if (!path.starts_with("${") || end == std::string::npos) continue;
+    const std::string name = path.substr(2, end - 2), rest = path.substr(end + 1);
+    const char* folder = std::getenv(name.c_str());
+    if (folder == nullptr) return fmt::format("the data is not here: {} is not set", name);
+    if (!std::filesystem::exists(folder + rest))
+      return fmt::format("the data is not here: {} names a folder without {}", name, rest.substr(rest.find('/') + 1));
+  }
+  return "";
+}
+
+/// Figures and status of the estimate of `place`/scene.yaml, or why there are none.
+nlohmann::ordered_json estimated(const YAML::Node& scene, const std::filesystem::path& place,
+                                 const std::filesystem::path& truth) {
+  if (const std::string missing = missing_recording(scene); !missing.empty())
+    return {{"status", "skipped"}, {"reason", missing}};
+  try {
+    auto result = to_json(run_estimate(read_scene_file(place / "scene.yaml", true), {place, truth, true}));
+    result["status"] = "done";
+    return result;
+  } catch (const BadInput& error) {
+    return {{"status", "failed"}, {"reason", error.what()}};
+  }
+}
+
 /// What a run is told, to be recognised by.
 std::string told_text(const StudyRun& run) {
   return YAML::Dump(run.scene) + "\n# sequence " + run.sequence + "\n";
@@ -84,7 +117,7 @@ void make_run(const StudyRun& run, const std::filesystem::path& folder) {
   YAML::Node scene = YAML::Clone(run.scene);
   std::filesystem::path truth;
   if (run.sequence.empty()) {
-    make_paths_absolute(scene, run.experiment->scene.parent_path());
+    make_paths_absolute(scene, run.scene_file.parent_path());
   } else {
     const std::filesystem::path sequence = sequence_folder(run.sequence, folder);
     YAML::Node base = YAML::LoadFile((sequence / "scene.yaml").string());
@@ -93,13 +126,7 @@ void make_run(const StudyRun& run, const std::filesystem::path& folder) {
     truth = sequence / "truth.csv";
   }
   write_text(place / "scene.yaml", YAML::Dump(scene) + "\n");
-  nlohmann::ordered_json result;
-  try {
-    result = to_json(run_estimate(read_scene_file(place / "scene.yaml", true), {place, truth, true}));
-    result["status"] = "done";
-  } catch (const BadInput& error) {
-    result = {{"status", "failed"}, {"reason", error.what()}};
-  }
+  nlohmann::ordered_json result = estimated(scene, place, truth);
   result["told"] = told_text(run);
   write_text(place / "result.json", result.dump(2) + "\n");
 }

@@ -11,7 +11,7 @@ namespace palpate::app {
 void make_sequence(const StudySequence& sequence, const Study& study, const std::filesystem::path& folder);
 
 /// One estimate into `folder`/runs/NAME, with its settings (scene.yaml) and result.json: figures, or why there are
-/// none.
+/// none (failed; skipped where the data of a real recording is not on this machine).
 void make_run(const StudyRun& run, const std::filesystem::path& folder);
 
 bool sequence_is_there(const StudySequence& sequence, const std::filesystem::path& folder);

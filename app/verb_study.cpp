@@ -72,7 +72,7 @@ void run_all(const Arguments& arguments, const StudyPlan& plan) {
       sequences.push_back(
           job(kSequencePrefix + sequence.name, sequence_folder(sequence.name, arguments.folder) / "log.txt"));
   for (const StudyRun& run : plan.runs)
-    if (result_of(run, arguments.folder).is_null())
+    if (const auto result = result_of(run, arguments.folder); result.is_null() || result["status"] == "skipped")
       runs.push_back(job(run.name, run_folder(run, arguments.folder) / "log.txt"));
   Progress progress("study", arguments.json);
   const int total = static_cast<int>(sequences.size() + runs.size());
@@ -92,7 +92,8 @@ void add_study(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("study", "Experiments and sweeps: many sequences and estimates, one page");
   verb->add_option("study", arguments->study, "study file")->required()->type_name("STUDY");
-  verb->add_option("-o,--output", arguments->folder, "folder for sequences, runs, results.csv and report.html")
+  verb->add_option("-o,--output", arguments->folder,
+                   "folder for sequences, runs, results.csv, report.html, results.md and figures")
       ->type_name("FOLDER")
       ->capture_default_str();
   verb->add_flag("--quick", arguments->quick, "the short form: fewer values of each sweep");
@@ -101,7 +102,8 @@ void add_study(CLI::App& app) {
   verb->add_option("--jobs", arguments->jobs, "runs at once")->check(CLI::Range(1, 256))->capture_default_str();
   verb->add_flag("--list-runs", arguments->list_runs, "print each run's own command line, for a scheduler; do nothing");
   verb->add_option("--run", arguments->run, "make this one only")->type_name("NAME");
-  verb->add_flag("--collect", arguments->collect, "only gather what is there into results.csv and report.html");
+  verb->add_flag("--collect", arguments->collect,
+                 "only gather what is there into results.csv, report.html, results.md and figures");
   verb->add_flag("--json", arguments->json, "figures as JSON on standard output, no progress");
   verb->footer(
       "A study that was broken off goes on where it stopped.\n"
@@ -122,14 +124,18 @@ void add_study(CLI::App& app) {
     if (!arguments->collect) run_all(*arguments, plan);
     std::filesystem::create_directories(arguments->folder);
     const StudyCount count = collect_study(study, plan, arguments->folder);
+    if (!count.drew_charts && !arguments->json)
+      fmt::print(stderr, "no charts in results.md: gnuplot is missing or failed\n");
     const std::string page = (arguments->folder / "report.html").string();
     if (arguments->json)
       fmt::print("{}", json_success({{"folder", arguments->folder.string()},
                                      {"done", count.done},
                                      {"failed", count.failed},
+                                     {"skipped", count.skipped},
                                      {"missing", count.missing}}));
     else
-      fmt::print("{} runs done, {} failed, {} missing\nlook at {}\n", count.done, count.failed, count.missing, page);
+      fmt::print("{} runs done, {} failed, {} skipped, {} missing\nlook at {}\n", count.done, count.failed,
+                 count.skipped, count.missing, page);
     if (count.missing > 0 && !arguments->collect)
       throw Unfinished(fmt::format("{} runs could not finish; the same command tries them again", count.missing));
   });
