@@ -8,10 +8,12 @@ namespace palpate {
 
 namespace {
 /// Slip corrections per frame: each brings the tangential force back to the cone, the next one mends the nonlinearity.
-constexpr int kSlipCorrections = 3;
+constexpr int kSlipCorrections = 4;
 constexpr double kConeTolerance = 1.02;
 /// The force of a frame is wanted to a per mille; the tip is not known better.
 constexpr double kFrameResidual = 1e-4;
+/// In footprint radii: a push that has slid farther stands on other tissue.
+constexpr double kFarthestSlip = 0.5;
 }  // namespace
 
 struct HeldContact::State {
@@ -20,7 +22,7 @@ struct HeldContact::State {
   Footprint footprint;
   EquilibriumSolver solver;
   ContactOptions options;
-  Vec3 slip_mm = Vec3::Zero();  // tangential path that the tip has slid over the tissue
+  Vec3 place_mm;  // of the tip on the surface at rest, from where it has slid
   bool near_attachment = false;
 
   State(const TetMesh& mesh, const std::vector<int>& fixed, const TissueOptions& tissue, const Vec3& touch_mm,
@@ -29,7 +31,8 @@ struct HeldContact::State {
         model(mesh, tissue, fixed, element),
         footprint(make_footprint(model, boundary, touch_mm, o.footprint_radius_mm)),
         solver(model, EquilibriumOptions{.relative_residual = kFrameResidual}),
-        options(o) {
+        options(o),
+        place_mm(footprint.center_mm) {
     solver.hold(footprint);
     double nearest_mm = std::numeric_limits<double>::infinity();
     for (int node : fixed)
@@ -37,26 +40,42 @@ struct HeldContact::State {
     near_attachment = nearest_mm < 2 * o.footprint_radius_mm;
   }
 
-  Answer push(const Vec3& displacement_mm) {
+  Answer grasp(const Vec3& displacement_mm) { return {solver.solve(displacement_mm), false, false}; }
+
+  /// Tangential part of a force beyond Coulomb's cone, as a share of the whole; 0 within the cone.
+  double share_beyond_cone(const Vec3& force_N) const {
+    const double normal_N = -force_N.dot(footprint.normal);
+    const double tangential_N = tangential(force_N).norm();
+    if (tangential_N <= kConeTolerance * options.friction * normal_N) return 0;
+    return 1 - options.friction * normal_N / tangential_N;
+  }
+
+  Vec3 tangential(const Vec3& v) const { return v - v.dot(footprint.normal) * footprint.normal; }
+
+  Answer apart() const {
     Answer answer;
-    for (int correction = 0; correction <= kSlipCorrections; ++correction) {
-      answer.equilibrium = solver.solve(displacement_mm - slip_mm);
-      if (!answer.equilibrium.converged) return answer;
-      const Vec3& force = answer.equilibrium.force_N;
-      const double normal_N = -force.dot(footprint.normal);
-      if (normal_N < 0) {
-        answer.let_go = true;
-        return answer;
-      }
-      const Vec3 tangential = force + normal_N * footprint.normal;
-      const double largest_N = options.friction * normal_N;
-      if (tangential.norm() <= kConeTolerance * largest_N || correction == kSlipCorrections) return answer;
-      answer.slid = true;
-      const Vec3 tied = displacement_mm - slip_mm;
-      const Vec3 tied_tangential = tied - tied.dot(footprint.normal) * footprint.normal;
-      slip_mm += (1 - largest_N / tangential.norm()) * tied_tangential;
-    }
+    answer.let_go = true;
+    answer.equilibrium.converged = true;
+    answer.equilibrium.u = Eigen::VectorXd::Zero(3 * model.node_count());
     return answer;
+  }
+
+  Answer push(const Vec3& displacement_mm, const Answer* tied) {
+    const Vec3 tip_mm = footprint.center_mm + displacement_mm;
+    bool slid = false;
+    for (int correction = 0;; ++correction) {
+      const Vec3 pressed_mm = tip_mm - place_mm;
+      if (pressed_mm.dot(footprint.normal) >= 0) return apart();
+      const bool is_tied = tied && correction == 0 && place_mm == footprint.center_mm;
+      Answer answer = is_tied ? *tied : grasp(pressed_mm);
+      answer.slid = slid;
+      if (!answer.equilibrium.converged) return answer;
+      if (answer.equilibrium.force_N.dot(footprint.normal) >= 0) return apart();
+      const double beyond = share_beyond_cone(answer.equilibrium.force_N);
+      if (beyond == 0 || correction == kSlipCorrections) return answer;
+      slid = true;
+      place_mm = closest_point(place_mm + beyond * tangential(pressed_mm), model.rest_mm(), boundary).point;
+    }
   }
 };
 
@@ -65,12 +84,26 @@ HeldContact::HeldContact(const TetMesh& mesh, const std::vector<int>& fixed_node
     : state_(std::make_unique<State>(mesh, fixed_nodes, tissue, touch_mm, options, element)) {}
 HeldContact::~HeldContact() = default;
 HeldContact::HeldContact(HeldContact&&) noexcept = default;
+HeldContact& HeldContact::operator=(HeldContact&&) noexcept = default;
+
+HeldContact::Answer HeldContact::grasp(const Vec3& displacement_mm) {
+  return state_->grasp(displacement_mm);
+}
+
+HeldContact::Answer HeldContact::push(const Vec3& displacement_mm, const Answer* tied) {
+  return state_->push(displacement_mm, tied);
+}
 
 HeldContact::Answer HeldContact::move(const Vec3& displacement_mm) {
-  if (state_->options.grip == Grip::push) return state_->push(displacement_mm);
-  Answer answer;
-  answer.equilibrium = state_->solver.solve(displacement_mm);
-  return answer;
+  return state_->options.grip == Grip::push ? push(displacement_mm) : grasp(displacement_mm);
+}
+
+const Vec3& HeldContact::place_mm() const {
+  return state_->place_mm;
+}
+
+bool HeldContact::has_left_its_footprint() const {
+  return (state_->place_mm - state_->footprint.center_mm).norm() > kFarthestSlip * state_->options.footprint_radius_mm;
 }
 
 const TetModel& HeldContact::model() const {

@@ -7,10 +7,9 @@
 #include <optional>
 
 #include "palpate/contact/detect.h"
-#include "palpate/contact/follow.h"
-#include "palpate/contact/held_contact.h"
 #include "palpate/contact/map_watch.h"
 #include "palpate/contact/onset.h"
+#include "palpate/contact/tip_contact.h"
 #include "palpate/contact/tissue_motion.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/elastic/stress.h"
@@ -24,7 +23,6 @@ namespace {
 constexpr double kLongestLost_s = 2;
 /// After a longer loss than a flicker, the tissue has to be seen to follow.
 constexpr int kFlickerFrames = 5;
-constexpr int kFewestFollowingPoints = 6;
 /// Elements around the footprint are split until their edges are no longer than its radius: finer ones change the force
 /// by less than 3 %.
 constexpr double kFootprintEdgeShare = 1;
@@ -67,8 +65,7 @@ struct ForceEstimator::State {
   std::array<cv::Mat, 2> last_pictures;
   OnsetDetector onset;
   TissueMotion tissue_motion;
-  ReleaseDetector release;
-  std::optional<HeldContact> held;
+  std::optional<TipContact> contact;
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
   std::optional<bool> was_closed;  // jaws of the free tip, where a tip track says so
@@ -76,15 +73,15 @@ struct ForceEstimator::State {
   double last_seen_s = 0;
 
   State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
-        const InstrumentOptions& instrument, const ContactOptions& contact)
+        const InstrumentOptions& instrument, const ContactOptions& contact_options)
       : map(std::move(m)),
         boundary(boundary_triangles(map.mesh)),
         rectification(r),
         attachments(a),
-        options(contact),
+        options(contact_options),
         tracker(instrument, rectification, rectify(rectification, static_frame), map.organ_mask),
         map_watch(rectify(rectification, static_frame).left, {}),
-        onset(contact.threshold_mm),
+        onset(contact_options.threshold_mm),
         tissue_motion(rectification) {}
 
   bool is_repeated(const RectifiedPair& pair) {
@@ -93,22 +90,25 @@ struct ForceEstimator::State {
     return same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
   }
 
-  void begin_contact(const RectifiedPair& pair, const InstrumentObservations& seen, const Gap& gap) {
+  HeldContact hold_at(const Vec3& place_mm) const {
     const double radius_mm = options.footprint_radius_mm;
     const TetMesh refined =
-        refine_near(map.mesh, gap.surface_point_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
+        refine_near(map.mesh, place_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
     const std::vector<int> fixed = select_attachments(
         refined, attachments, [this](const Vec3& point) { return project_to_recorded_left(rectification.rig, point); });
-    held.emplace(refined, fixed, map.tissue, gap.surface_point_mm, options, map.element);
+    return HeldContact(refined, fixed, map.tissue, place_mm, options, map.element);
+  }
+
+  void begin_contact(const RectifiedPair& pair, const InstrumentObservations& seen, const Gap& gap) {
+    contact.emplace([this](const Vec3& place_mm) { return hold_at(place_mm); }, gap.surface_point_mm, options.grip);
     onset_tip_mm = seen.tips[0].tip_mm;
     tracker.mark(0);
-    release.start();
     tissue_motion.start(pair, seen.left_mask, gap.surface_point_mm,
-                        std::max(kLeastWatched_mm, kWatchedRadii * radius_mm));
+                        std::max(kLeastWatched_mm, kWatchedRadii * options.footprint_radius_mm));
   }
 
   void end_contact(const Vec3& tip_mm) {
-    held.reset();
+    contact.reset();
     tracker.unmark(0);
     tissue_motion.stop();
     onset.let_go(tip_mm);
@@ -135,44 +135,30 @@ struct ForceEstimator::State {
       return std::nullopt;
     }
     const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);
-    estimate.tip_mm = held->footprint().center_mm + p;
-    const HeldContact::Answer answer = held->move(p);
-    if (answer.let_go) {
-      estimate.tip_mm = tip.tip_mm;
-      end_contact(tip.tip_mm);
-      return std::nullopt;
-    }
     const std::vector<TissuePoint> seen = tissue_motion.update(pair, instruments.left_mask, instruments.right_mask);
-    std::vector<Vec3> rest;
-    for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
-    const std::vector<Vec3> predicted = displacement_at(held->model(), held->boundary(), answer.equilibrium.u, rest);
-    const Follow follow = compare_motion(seen, predicted);
-    const bool stays_behind = release.update(estimate.tip_mm, seen, predicted);
-    const bool cannot_tell = lost_frames > kFlickerFrames && follow.points < kFewestFollowingPoints;
-    if (follow.let_go || stays_behind || cannot_tell) {
-      estimate.tip_mm = tip.tip_mm;
-      end_contact(tip.tip_mm);
-      return std::nullopt;
-    }
-    estimate.misfit_mm = follow.misfit_mm;
+    TipContact::Answer answer = contact->update(p, seen, lost_frames > kFlickerFrames);
+    if (answer.state == TipContact::State::over) end_contact(tip.tip_mm);
+    if (answer.state != TipContact::State::touching) return std::nullopt;
+    estimate.tip_mm = answer.tip_mm;
+    estimate.misfit_mm = answer.misfit_mm;
     if (answer.slid) estimate.warnings.push_back("sliding");
-    return answer.equilibrium;
+    return std::move(answer.equilibrium);
   }
 
   void report(const Equilibrium& equilibrium, ForceEstimate& estimate) const {
     estimate.in_contact = true;
     estimate.residual = equilibrium.residual;
     estimate.status = FrameStatus::not_converged;
-    if (held->near_attachment()) estimate.warnings.push_back("near_attachment");
-    if (!held->model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
+    if (contact->held().near_attachment()) estimate.warnings.push_back("near_attachment");
+    if (!contact->held().model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
     // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
     if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
     if (!equilibrium.converged) return;
     estimate.status = estimate.misfit_mm > kStaleMisfit_mm ? FrameStatus::map_stale : FrameStatus::ok;
     estimate.force_N = equilibrium.force_N;
     estimate.mean_nodal_force_N = equilibrium.mean_nodal_force_N;
-    estimate.deformed_nodes_mm = deformed(held->model(), equilibrium.u);
-    estimate.boundary = held->boundary();
+    estimate.deformed_nodes_mm = deformed(contact->held().model(), equilibrium.u);
+    estimate.boundary = contact->held().boundary();
   }
 };
 
@@ -209,8 +195,8 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   if (!tip.visible || scene.veiled) {
     estimate.status = FrameStatus::tool_lost;
     ++s.lost_frames;
-    if (s.held && frame.time_s - s.last_seen_s > kLongestLost_s) s.end_contact(s.last_tip_mm);
-    if (!s.held) s.onset.lose();
+    if (s.contact && frame.time_s - s.last_seen_s > kLongestLost_s) s.end_contact(s.last_tip_mm);
+    if (!s.contact) s.onset.lose();
     return estimate;
   }
   s.last_seen_s = frame.time_s;
@@ -221,9 +207,9 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   // tip.
   const bool stale = scene.map_is_stale;
   if (stale) estimate.status = FrameStatus::map_stale;
-  if (!s.held && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, seen);
+  if (!s.contact && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, seen);
   estimate.times.contact_ms = watch.lap_ms();
-  if (!s.held) {
+  if (!s.contact) {
     s.lost_frames = 0;
     return estimate;
   }
@@ -236,7 +222,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   s.report(*equilibrium, estimate);
   if (stale && estimate.status == FrameStatus::ok) estimate.status = FrameStatus::map_stale;
   if (estimate.status == FrameStatus::not_converged) return estimate;
-  estimate.node_von_mises_kPa = node_von_mises_kPa(s.held->model(), equilibrium->u);
+  estimate.node_von_mises_kPa = node_von_mises_kPa(s.contact->held().model(), equilibrium->u);
   estimate.max_von_mises_kPa =
       *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
   estimate.times.stress_ms = watch.lap_ms();

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "palpate/contact/follow.h"
+#include "palpate/contact/grip_judge.h"
+#include "palpate/contact/held_contact.h"
+
+namespace palpate {
+
+/// One tip on the tissue, from onset to release: what the tip's path and the tissue's motion say about how it holds,
+/// whether it still does, and the equilibrium that follows.
+class TipContact {
+ public:
+  /// A body refined around a place of the surface at rest, held there.
+  using HoldAt = std::function<HeldContact(const Vec3& place_mm)>;
+
+  /// `touch_mm`: where the tip met the surface at rest.
+  TipContact(HoldAt hold_at, const Vec3& touch_mm, Grip grip);
+
+  enum class State {
+    touching,  ///< the tip acts on the tissue
+    lifted,    ///< a push that is off the tissue, but not yet away from it
+    over       ///< let go; nothing more is to be asked
+  };
+  struct Answer {
+    State state = State::touching;
+    Equilibrium equilibrium;  ///< while touching
+    Vec3 tip_mm = Vec3::Zero();
+    double misfit_mm = 0;  ///< between the predicted and the seen motion of the tissue, median
+    bool slid = false;
+  };
+
+  /// `displacement_mm`: of the tip since onset. `seen`: the tissue around the contact, since onset.
+  /// `has_to_be_seen`: the tip was away for so long that it only holds if the tissue shows it.
+  Answer update(const Vec3& displacement_mm, const std::vector<TissuePoint>& seen, bool has_to_be_seen = false);
+
+  /// The body in its present place.
+  const HeldContact& held() const { return held_; }
+  /// `automatic` as long as it cannot be told.
+  Grip grip() const { return judge_.grip(); }
+
+ private:
+  struct Believed {
+    HeldContact::Answer answer;
+    std::vector<Vec3> predicted_mm;
+  };
+  Believed believe(const Vec3& from_footprint_mm, const std::vector<TissuePoint>& seen);
+  std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const;
+  State state_of(const HeldContact::Answer& answer, double height_mm);
+  void move_footprint();
+
+  HoldAt hold_at_;
+  HeldContact held_;
+  Vec3 touch_mm_;
+  Grip asked_for_;
+  GripJudge judge_;
+  ReleaseDetector release_;
+  int pressed_frames_ = 0;
+  bool lifted_ = false;
+};
+
+}  // namespace palpate
