@@ -6,6 +6,7 @@
 
 #include "app/answer.h"
 #include "app/run.h"
+#include "app/track_check.h"
 #include "app/verbs.h"
 
 namespace palpate::app {
@@ -52,20 +53,28 @@ void add_check(CLI::App& app) {
     bool json = false;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("check", "Says what is wrong with an input before anything runs; writes nothing");
+  CLI::App* verb =
+      app.add_subcommand("check",
+                         "Says what is wrong with an input before anything runs, and how a tip track lies to the "
+                         "video; writes nothing");
   verb->add_option("scene", arguments->scene, "scene.yaml")->required()->type_name("SCENE");
   verb->add_flag("--json", arguments->json, "answer as JSON");
   verb->footer("Example: palpate check scene.yaml");
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     const BuiltMap built = build_map(scene_file, arguments->json);
+    std::optional<TrackCheck> track;
+    if (!scene_file.scene.instrument.track.empty()) track = check_track(scene_file, built, arguments->json);
     if (arguments->json) {
-      fmt::print("{}", json_success(json_of(scene_file, built)));
+      nlohmann::ordered_json json = json_of(scene_file, built);
+      if (track) json["track"] = to_json(*track);
+      fmt::print("{}", json_success(json));
       return;
     }
     fmt::print("{}: fine. {} points ({:.0f} % of the organ region), {} tetrahedra, {} attached nodes.\n",
                arguments->scene.string(), built.map.cloud.size(), 100 * built.map.report.coverage,
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size());
+    if (track) fmt::print("{}", to_text(*track));
   });
 }
 

@@ -26,6 +26,8 @@ constexpr double kCoarseStep_s = 0.02, kFineStep_s = 0.001;
 /// Frames farther off than this many times the median, and than a good measurement, do not fit.
 constexpr double kMostMedians = 3, kGood_mm = 0.5;
 constexpr int kFits = 4;
+/// Errors of a tip that is followed stay for about so many frames.
+constexpr double kAlikeFrames = 10;
 /// How far the tip has to move, RMS: at all, and across the line that it follows most.
 constexpr double kLeastMotion_mm = 3, kLeastSpread_mm = 0.7;
 
@@ -173,7 +175,8 @@ HandEye estimate_hand_eye(const std::vector<SeenTip>& seen, const TipTrack& trac
   result.rms_mm = agreement.rms_mm;
   // About the line of most motion only the spread across it holds the rotation.
   const double across_mm = std::hypot(spread[0], spread[1]);
-  result.deviation_deg = 180 / std::numbers::pi * agreement.rms_mm / std::sqrt(3.0 * result.frames) / across_mm;
+  result.deviation_deg =
+      180 / std::numbers::pi * agreement.rms_mm / std::sqrt(3 * result.frames / kAlikeFrames) / across_mm;
   return result;
 }
 

@@ -68,8 +68,8 @@ TEST(HandEye, IsNotLedAstrayByNoiseAndFramesInWhichSomethingElseWasTakenForTheTi
   }
   EXPECT_LT(std::sqrt(squared / 120), 0.3);
   EXPECT_LE(found.frames, 120 - 120 / 8);
-  EXPECT_GT(found.deviation_deg, 0);
-  EXPECT_LT(found.deviation_deg, 1);
+  EXPECT_GT(found.deviation_deg, 0.3);
+  EXPECT_LT(found.deviation_deg, 3);
 }
 
 TEST(HandEye, SaysWhenAStraightPathLeavesTheRotationOpen) {
