@@ -27,19 +27,21 @@ struct Arguments {
   int jobs = 1;
 };
 
-/// Without what --only leaves out, and without sequences that nobody needs then.
-StudyPlan selected(StudyPlan plan, const std::string& pattern) {
+/// Without what --only leaves out, and without sequences that nobody needs then. Copied, not erased in place: assigning
+/// to a YAML::Node changes every other that shares it.
+StudyPlan selected(const StudyPlan& plan, const std::string& pattern) {
   if (pattern.empty()) return plan;
-  std::erase_if(plan.runs, [&pattern](const StudyRun& run) {
-    return fnmatch(pattern.c_str(), run.name.c_str(), 0) != 0 &&
-           fnmatch(pattern.c_str(), run.experiment->name.c_str(), 0) != 0;
-  });
-  if (plan.runs.empty()) throw BadInput(fmt::format("--only {}: no run has such a name (see --list-runs)", pattern));
-  std::erase_if(plan.sequences, [&plan](const StudySequence& sequence) {
-    return std::none_of(plan.runs.begin(), plan.runs.end(),
-                        [&sequence](const StudyRun& run) { return run.sequence == sequence.name; });
-  });
-  return plan;
+  StudyPlan chosen;
+  for (const StudyRun& run : plan.runs)
+    if (fnmatch(pattern.c_str(), run.name.c_str(), 0) == 0 ||
+        fnmatch(pattern.c_str(), run.experiment->name.c_str(), 0) == 0)
+      chosen.runs.push_back(run);
+  if (chosen.runs.empty()) throw BadInput(fmt::format("--only {}: no run has such a name (see --list-runs)", pattern));
+  for (const StudySequence& sequence : plan.sequences)
+    if (std::any_of(chosen.runs.begin(), chosen.runs.end(),
+                    [&sequence](const StudyRun& run) { return run.sequence == sequence.name; }))
+      chosen.sequences.push_back(sequence);
+  return chosen;
 }
 
 std::vector<std::string> command_of(const Arguments& arguments, const std::string& name) {
