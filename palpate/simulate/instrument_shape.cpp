@@ -53,8 +53,15 @@ void add_cone(Surface& surface, double from_z, double from_radius, double to_z, 
   add_skin(surface, {ellipse({0, 0, from_z}, from_radius, from_radius), ellipse({0, 0, to_z}, to_radius, to_radius)});
 }
 
-void add_shaft(Surface& surface, double radius, double end_z) {
-  add_cone(surface, end_z - kShaftLength_mm, radius, end_z - 0.8, radius);
+// `pieces` more than one let a texture vary along it.
+void add_shaft(Surface& surface, double radius, double end_z, int pieces) {
+  std::vector<Ring> rings;
+  for (int i = 0; i < pieces; ++i) {
+    const double z = end_z - kShaftLength_mm + i * (kShaftLength_mm - 0.8) / pieces;
+    rings.push_back(ellipse({0, 0, z}, radius, radius));
+  }
+  rings.push_back(ellipse({0, 0, end_z - 0.8}, radius, radius));
+  add_skin(surface, rings);
   add_cone(surface, end_z - 0.8, radius, end_z, radius - 0.7);
 }
 
@@ -81,18 +88,18 @@ void add_jaw(Surface& surface, double shaft_radius, double length, double angle,
   add_skin(surface, rings);
 }
 
-Surface grasper(double radius, double opening) {
+Surface grasper(double radius, double opening, int pieces) {
   const double jaw = 13, angle = (2.0 + 6 * opening) * kPi / 180;
   Surface surface;
   add_jaw(surface, radius, jaw, angle, 1);
   add_jaw(surface, radius, jaw, angle, -1);
   add_cone(surface, -jaw - 7, 0.72 * radius, -jaw + 1, 0.62 * radius);
   add_cone(surface, -jaw - 12, 1.03 * radius, -jaw - 6, 0.98 * radius);
-  add_shaft(surface, radius, -jaw - 12);
+  add_shaft(surface, radius, -jaw - 12, pieces);
   return surface;
 }
 
-Surface probe(double radius) {
+Surface probe(double radius, int pieces) {
   const double tip_radius = 0.6 * radius;
   Surface surface;
   std::vector<Ring> rings;
@@ -103,12 +110,12 @@ Surface probe(double radius) {
   }
   add_skin(surface, rings);
   add_cone(surface, -16, tip_radius, -tip_radius, tip_radius);
-  add_shaft(surface, radius, -16);
+  add_shaft(surface, radius, -16, pieces);
   return surface;
 }
 
 // A bar that runs beside the axis and bends back to it in a half circle that ends at the tip's level.
-Surface hook(double radius) {
+Surface hook(double radius, int pieces) {
   const double bar = 0.28 * radius, bend = 0.9 * radius;
   Surface surface;
   std::vector<Ring> rings;
@@ -125,21 +132,22 @@ Surface hook(double radius) {
   }
   add_skin(surface, rings);
   add_skin(surface, {ellipse({0.9 * bend, 0, -16}, bar, bar), ellipse({0.9 * bend, 0, -bend - bar}, bar, bar)});
-  add_shaft(surface, radius, -15);
+  add_shaft(surface, radius, -15, pieces);
   return surface;
 }
 
 Surface in_own_frame(const SimulatedInstrument& instrument, double opening) {
   const double radius = instrument.shaft_mm / 2;
+  const int pieces = instrument.look == SimulatedInstrument::Look::steel && instrument.blood == 0 ? 1 : 64;
   switch (instrument.model) {
     case SimulatedInstrument::Model::probe:
-      return probe(radius);
+      return probe(radius, pieces);
     case SimulatedInstrument::Model::hook:
-      return hook(radius);
+      return hook(radius, pieces);
     case SimulatedInstrument::Model::grasper:
       break;
   }
-  return grasper(radius, opening);
+  return grasper(radius, opening, pieces);
 }
 
 }  // namespace

@@ -238,13 +238,13 @@ StereoFrame Renderer::render(int index) {
   return recorded(light(index, index / scene_->camera.fps), scene_->camera, scene_->look, index);
 }
 
-cv::Mat Renderer::visible_mask(int surface) {
+cv::Mat Renderer::visible_mask(int surface, int eye) {
   scene_->rays.commit();
   cv::Mat mask(scene_->camera.height, scene_->camera.width, CV_8U, cv::Scalar(0));
   tbb::parallel_for(0, mask.rows, [&](int y) {
     for (int x = 0; x < mask.cols; ++x) {
       const Vec3f direction = scene_->ray_direction(static_cast<float>(x), static_cast<float>(y));
-      if (scene_->rays.first_hit(scene_->eye_mm(0), direction).surface == surface) mask.at<uchar>(y, x) = 255;
+      if (scene_->rays.first_hit(scene_->eye_mm(eye), direction).surface == surface) mask.at<uchar>(y, x) = 255;
     }
   });
   return mask;

@@ -38,8 +38,8 @@ class Renderer {
   /// Both images of a frame as recorded, 8-bit BGR.
   StereoFrame render(int index);
 
-  /// 255 where the left eye sees this surface before all others.
-  cv::Mat visible_mask(int surface);
+  /// 255 where an eye (0 left, 1 right) sees this surface before all others.
+  cv::Mat visible_mask(int surface, int eye = 0);
 
  private:
   struct Scene;

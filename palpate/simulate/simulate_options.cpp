@@ -127,6 +127,16 @@ void describe_instrument(Settings& settings, SimulatedInstrument& instrument) {
   settings.choice("model", instrument.model,
                   {{"grasper", Model::grasper}, {"probe", Model::probe}, {"hook", Model::hook}},
                   "shape of the instrument");
+  using Look = SimulatedInstrument::Look;
+  settings.choice(
+      "look", instrument.look,
+      {{"steel", Look::steel},
+       {"dark_ribbed", Look::dark_ribbed},
+       {"white_ceramic", Look::white_ceramic},
+       {"blue_tube", Look::blue_tube}},
+      "steel all over; a dark-grey ribbed shaft with a bright wrist and jaws that reflect the tissue's red; "
+      "white with a steel end; a bluish-white tube with holes");
+  settings.number("blood", instrument.blood, {0, 0.9}, "share of it that is smeared with blood");
   settings.number("shaft_mm", instrument.shaft_mm, {1, 20}, "diameter of the shaft, mm");
   settings.vector3("enters_from", instrument.enters_from, {-kLargest_mm, kLargest_mm},
                    "point that the shaft always passes through, left camera frame, mm");
@@ -165,6 +175,9 @@ void describe_files(Settings& settings, SimulatedFiles& files) {
   settings.flag("depth", files.depth,
                 "depth/left_0000.png ...: what the left eye sees, 16 bit, in hundredths of a millimetre along the "
                 "optical axis, 0 = nothing");
+  settings.flag("sensor", files.sensor,
+                "sensor.csv: what a force sensor logs (100 Hz, its own clock, axes of the tool, an offset, noise); "
+                "sensor.yaml: what of it has to be found out");
   settings.choice("grip", files.grip,
                   {{"known", SimulatedFiles::Grip::known}, {"auto", SimulatedFiles::Grip::automatic}},
                   "contact.grip of the scene.yaml that is written: that of the gesture, or left to the estimator");

@@ -80,6 +80,8 @@ struct SimulatedCamera {
 /// `simulate.instrument`.
 struct SimulatedInstrument {
   enum class Model { grasper, probe, hook } model = Model::grasper;
+  enum class Look { steel, dark_ribbed, white_ceramic, blue_tube } look = Look::steel;
+  double blood = 0;                      ///< share of it that is smeared
   double shaft_mm = 6.4;                 ///< diameter
   Vec3 enters_from = Vec3(130, 25, 20);  ///< the shaft always passes through this point
   double free_distance_mm = 48;          ///< how far from the contact the tip begins and ends, along the shaft
@@ -109,6 +111,7 @@ struct SimulatedBreathing {
 struct SimulatedFiles {
   bool surface = false;  ///< surface/frame_0000.ply ...: the organ as it is in each frame
   bool depth = false;    ///< depth/left_0000.png ...: 16 bit, hundredths of a millimetre, 0 = nothing
+  bool sensor = false;   ///< sensor.csv and sensor.yaml: the log of a force sensor, see force_sensor.h
   enum class Grip { known, automatic } grip = Grip::known;  ///< what scene.yaml says to the estimator
 };
 

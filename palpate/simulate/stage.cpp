@@ -8,6 +8,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/simulate/estimate_look.h"
+#include "palpate/simulate/instrument_look.h"
 #include "palpate/volume/polygon_soup.h"
 
 namespace palpate {
@@ -87,8 +88,8 @@ Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBo
   organ_number_ = renderer_.add(organ_, {bloody(tissue_, look.blood, look.seed),
                                          texels_per_mm(organ_.vertices_mm[0].z()), look.roughness, look.reflectance});
   wall_number_ = renderer_.add(wall_, {wall_texture(look.seed), texels_per_mm(wall_.vertices_mm[0].z()), 0.6, 0.03});
-  instrument_number_ =
-      renderer_.add(make_instrument(options.instrument, first_place), {steel_texture(), 1, 0.55, 0.35});
+  instrument_number_ = renderer_.add(make_instrument(options.instrument, first_place),
+                                     instrument_look(options.instrument, first_place, look.seed));
 }
 
 void Stage::show(const Moment& moment) {
