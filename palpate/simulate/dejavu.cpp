@@ -1,5 +1,6 @@
 #include "palpate/simulate/dejavu.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "palpate/simulate/gesture.h"
 #include "palpate/simulate/organ_shape.h"
 #include "palpate/simulate/stage.h"
+#include "palpate/volume/inside.h"
 
 namespace palpate {
 namespace {
@@ -22,10 +24,15 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-double extent_along_view_mm(const Surface& organ) {
-  const auto [nearest, farthest] = std::minmax_element(organ.vertices_mm.begin(), organ.vertices_mm.end(),
-                                                       [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); });
-  return farthest->z() - nearest->z();
+/// Volume over the area of the shadow along the optical axis: pushed back by this much, the visible surface encloses as
+/// much as the organ does.
+double mean_thickness_mm(const Surface& organ) {
+  double twice_shadow_mm2 = 0;
+  for (const Triangle& t : organ.triangles) {
+    const auto corner = [&](size_t k) { return organ.vertices_mm[static_cast<size_t>(t[k])]; };
+    twice_shadow_mm2 += 0.5 * std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).z());
+  }
+  return enclosed_volume_mm3(organ) / (0.5 * twice_shadow_mm2);
 }
 
 std::vector<cv::Point2d> outline(const cv::Mat& mask) {
@@ -78,7 +85,7 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   summary.truth_elements = static_cast<int>(truth.mesh.tetrahedra.size());
   summary.truth_nodes = static_cast<int>(truth.mesh.nodes_mm.size());
   summary.tied_nodes = static_cast<int>(truth.footprint.samples.size());
-  summary.thickness_mm = extent_along_view_mm(organ);
+  summary.thickness_mm = mean_thickness_mm(organ);
   summary.contact_mm = touch.point_mm;
   summary.contact_normal = touch.axes.col(0);
   summary.contact_radius_mm = truth.patch_radius_mm;

@@ -27,7 +27,7 @@ struct DejaVuSummary {
   double draw_s = 0;                 ///< time of all pictures and videos
 
   std::vector<cv::Point2d> organ_region_px;  ///< outline of the organ in the first left image, without the instrument
-  double thickness_mm = 0;                   ///< extent of the organ along the optical axis
+  double thickness_mm = 0;                   ///< of the organ along the optical axis, mean
   Vec3 contact_mm = Vec3::Zero();            ///< at rest
   Vec3 contact_normal = Vec3::UnitZ();       ///< outwards
   double contact_radius_mm = 0;              ///< of the patch that the instrument holds in the truth

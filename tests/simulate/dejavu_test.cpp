@@ -16,6 +16,7 @@
 #include "palpate/simulate/uterus_demo.h"
 #include "palpate/stereo/rig.h"
 #include "palpate/volume/body.h"
+#include "palpate/volume/inside.h"
 
 namespace palpate {
 namespace {
@@ -167,8 +168,14 @@ TEST_F(DejaVu, OutlineCoversTheOrganInTheFirstPicture) {
   std::vector<cv::Point2f> hull;
   cv::convexHull(projected, hull);
   EXPECT_NEAR(cv::contourArea(polygon) / cv::contourArea(hull), 1, 0.05);
-  EXPECT_GT(summary.thickness_mm, 40);
-  EXPECT_LT(summary.thickness_mm, 62);
+}
+
+TEST_F(DejaVu, TheThicknessTimesTheShadowIsTheVolume) {
+  const Surface organ = make_organ(small_case().simulate.body, 5000);
+  std::vector<cv::Point2f> points, shadow;
+  for (const Vec3& p : organ.vertices_mm) points.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
+  cv::convexHull(points, shadow);
+  EXPECT_NEAR(summary.thickness_mm * cv::contourArea(shadow) / enclosed_volume_mm3(organ), 1, 0.03);
 }
 
 // The organ that the files tell of is where its depth is seen, but for where the instrument stands before it.
