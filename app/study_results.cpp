@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "app/study_run.h"
 #include "app/study_slopes.h"
 #include "palpate/core/errors.h"
 #include "palpate/feedback/forces_file.h"
+#include "palpate/feedback/sensor_log.h"
 
 namespace palpate::app {
 
@@ -31,6 +33,7 @@ const std::vector<std::pair<std::string, std::string>> kColumns = {
     {"true_peak_N", "true peak, N"},
     {"peak_force_N", "peak, N"},
     {"peak_force_per_modulus_N_per_kPa", "peak / E, N/kPa"},
+    {"sensor_rmse_N", "against the sensor, N RMS"},
     {"sensor_nrmse_pct", "against the sensor, % of its peak"},
     {"sensor_scale", "one factor"},
     {"sensor_nrmse_scaled_pct", "after that factor, %"},
@@ -42,6 +45,13 @@ const std::vector<std::pair<std::string, std::string>> kColumns = {
     {"p99_frame_ms", "frame, ms 99 %"},
     {"statuses", "frames"},
 };
+
+/// Their names in the answer of palpate compare --sensor.
+const std::map<std::string, std::string> kOfSensor = {{"sensor_rmse_N", "force_rmse_N"},
+                                                      {"sensor_nrmse_pct", "force_nrmse_pct"},
+                                                      {"sensor_scale", "scale"},
+                                                      {"sensor_nrmse_scaled_pct", "force_nrmse_scaled_pct"},
+                                                      {"sensor_correlation", "force_correlation"}};
 
 Json read_json(const std::filesystem::path& file) {
   std::ifstream stream(file);
@@ -65,7 +75,7 @@ Json figures_of(const Json& result, const std::filesystem::path& place) {
   for (const auto& [name, title] : kColumns) {
     const bool of_sensor = name.starts_with("sensor_");
     const Json& group = of_sensor ? sensor : comparison.contains(name) ? comparison : result;
-    const std::string key = of_sensor ? name.substr(7) : name;
+    const std::string key = of_sensor ? kOfSensor.at(name) : name;
     figures[name] = group.contains(key) ? group[key] : Json();
   }
   if (map.contains("coverage")) figures["coverage_pct"] = 100 * map["coverage"].get<double>();
@@ -80,11 +90,26 @@ Json points_of(const std::vector<ForceRow>& rows) {
   return points;
 }
 
+/// The sensor's log in the time of the video, as palpate compare --sensor aligns it.
+Json aligned_points(const std::vector<ForceRow>& estimate, const std::filesystem::path& log) {
+  const auto readings = read_sensor_log(log);
+  Json points = Json::array();
+  for (const SensorReading& reading : aligned(readings, compare_with_sensor(estimate, readings)))
+    if (reading.time_s >= 0 && reading.time_s <= estimate.back().time_s)
+      points.push_back(
+          {{"x", std::round(reading.time_s * 1e3) / 1e3}, {"y", std::round(reading.force_N.norm() * 1e3) / 1e3}});
+  return points;
+}
+
 Json series_of(const std::filesystem::path& forces, const std::filesystem::path& truth) {
   Json series;
   try {
-    series["estimate"] = points_of(read_forces(forces));
-    if (!truth.empty()) series["truth"] = points_of(read_truth(truth));
+    const std::vector<ForceRow> estimate = read_forces(forces);
+    series["estimate"] = points_of(estimate);
+    if (truth.empty()) return series;
+    series["truth"] = points_of(read_truth(truth));
+    if (const auto log = truth.parent_path() / "sensor.csv"; std::filesystem::exists(log))
+      series["sensor"] = aligned_points(estimate, log);
   } catch (const BadInput&) {
     return series;
   }

@@ -8,6 +8,7 @@
 #include "app/run.h"
 #include "app/simulation.h"
 #include "palpate/core/errors.h"
+#include "palpate/feedback/sensor_log.h"
 
 namespace palpate::app {
 
@@ -63,6 +64,15 @@ std::string missing_recording(const YAML::Node& scene) {
   return "";
 }
 
+/// As palpate compare --sensor; empty where there is no force to align.
+nlohmann::ordered_json against_sensor(const std::filesystem::path& forces, const std::filesystem::path& log) {
+  try {
+    return nlohmann::ordered_json::parse(to_json(compare_with_sensor(read_forces(forces), read_sensor_log(log))));
+  } catch (const BadInput&) {
+    return nlohmann::ordered_json::object();
+  }
+}
+
 /// Figures and status of the estimate of `place`/scene.yaml, or why there are none.
 nlohmann::ordered_json estimated(const YAML::Node& scene, const std::filesystem::path& place,
                                  const std::filesystem::path& truth) {
@@ -71,6 +81,8 @@ nlohmann::ordered_json estimated(const YAML::Node& scene, const std::filesystem:
   try {
     auto result = to_json(run_estimate(read_scene_file(place / "scene.yaml", true), {place, truth, true}));
     result["status"] = "done";
+    if (const auto log = truth.parent_path() / "sensor.csv"; !truth.empty() && std::filesystem::exists(log))
+      result["sensor"] = against_sensor(place / "forces.csv", log);
     return result;
   } catch (const BadInput& error) {
     return {{"status", "failed"}, {"reason", error.what()}};

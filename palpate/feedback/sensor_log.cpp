@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "palpate/core/errors.h"
 #include "palpate/feedback/csv_table.h"
@@ -156,6 +157,41 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   result.nrmse_pct = 100 * result.rmse_N / result.sensor_peak_N;
   result.nrmse_scaled_pct = 100 * result.rmse_scaled_N / result.sensor_peak_N;
   return result;
+}
+
+std::vector<SensorReading> aligned(const std::vector<SensorReading>& sensor, const SensorComparison& found) {
+  std::vector<SensorReading> readings;
+  for (const SensorReading& reading : sensor)
+    readings.push_back({reading.time_s - found.delay_s, found.camera_from_sensor * (reading.force_N - found.zero_N)});
+  return readings;
+}
+
+std::string to_text(const SensorComparison& found) {
+  return fmt::format(
+      "sensor's clock        {:+.3f} s against the video's, found by correlation\n"
+      "force RMSE            {:.3f} N, {:.1f} % of the sensor's peak of {:.2f} N\n"
+      "after one factor      {:.3f} N, {:.1f} %, with the estimate times {:.3f}\n"
+      "correlation           {:.4f} over {} frames\n",
+      found.delay_s, found.rmse_N, found.nrmse_pct, found.sensor_peak_N, found.rmse_scaled_N, found.nrmse_scaled_pct,
+      found.scale, found.correlation, found.frames);
+}
+
+std::string to_json(const SensorComparison& found) {
+  nlohmann::ordered_json axes = nlohmann::ordered_json::array();
+  for (int row = 0; row < 3; ++row)
+    axes.push_back(
+        {found.camera_from_sensor(row, 0), found.camera_from_sensor(row, 1), found.camera_from_sensor(row, 2)});
+  const nlohmann::ordered_json json = {{"frames", found.frames},
+                                       {"delay_s", found.delay_s},
+                                       {"camera_from_sensor", axes},
+                                       {"sensor_peak_N", found.sensor_peak_N},
+                                       {"force_rmse_N", found.rmse_N},
+                                       {"force_nrmse_pct", found.nrmse_pct},
+                                       {"scale", found.scale},
+                                       {"force_rmse_scaled_N", found.rmse_scaled_N},
+                                       {"force_nrmse_scaled_pct", found.nrmse_scaled_pct},
+                                       {"force_correlation", found.correlation}};
+  return json.dump(1) + "\n";
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "palpate/core/geometry.h"
@@ -38,5 +39,14 @@ struct SensorComparison {
 
 /// Throws BadInput where they overlap by less than half of the video, or where no force is to be seen in one of them.
 SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor);
+
+/// The log in the video's time and the left camera frame, less its zero.
+std::vector<SensorReading> aligned(const std::vector<SensorReading>& sensor, const SensorComparison& found);
+
+/// Lines of name and value.
+std::string to_text(const SensorComparison& found);
+
+/// One JSON object.
+std::string to_json(const SensorComparison& found);
 
 }  // namespace palpate

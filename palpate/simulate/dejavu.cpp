@@ -8,6 +8,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/simulate/dejavu_files.h"
+#include "palpate/simulate/force_sensor.h"
 #include "palpate/simulate/gesture.h"
 #include "palpate/simulate/organ_shape.h"
 #include "palpate/simulate/stage.h"
@@ -46,6 +47,12 @@ std::vector<cv::Point2d> outline(const cv::Mat& mask) {
   cv::approxPolyDP(*largest, corners, 1.0, true);
   if (corners.size() < 3) throw BadInput("simulate.body: the organ is too small in the left image");
   return {corners.begin(), corners.end()};
+}
+
+// Direction of the shaft when it first touches.
+Vec3 touching_axis(const std::vector<Moment>& moments) {
+  const auto touch = std::find_if(moments.begin(), moments.end(), [](const Moment& m) { return m.truth.in_contact; });
+  return (touch == moments.end() ? moments.front() : *touch).place.axis;
 }
 
 // Facts about the moments that the summary tells.
@@ -114,6 +121,10 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   std::vector<TruthRow> rows;
   for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields)) rows.push_back(moments[i].truth);
   write_truth(folder / "truth.csv", rows);
+  if (options.write.sensor) {
+    const ForceSensor sensor = make_force_sensor(touching_axis(moments), options.look.seed);
+    write_force_sensor(folder, sensor, log_of(sensor, rows, options.look.seed));
+  }
   StereoVideoWriter video(folder, options.camera);
   const FrameFiles frame_files(folder, options.write);
   for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields)) {

@@ -34,12 +34,13 @@ struct DejaVuSummary {
   Grip grip = Grip::automatic;               ///< what the estimator is told
 };
 
-/// DejaVu (the paper's [22]): stereo video with known force. Writes left.mp4, right.mp4, calibration.yaml and truth.csv
-/// into `folder` (made if missing). The truth is in equilibrium in every frame (quasi-static, weightless, unstressed at
-/// rest); the patch of tissue that the instrument holds moves with it rigidly from grasp to release; a push slides with
-/// friction (see PushedTissue). `contact` gives the radius of the patch where the gesture does not, and the friction.
-/// `progress(done, total)` is called after every step. Throws BadInput before anything is written: gesture that misses
-/// the organ, tissue that finds no equilibrium, ...; Unfinished when a file cannot be written.
+/// DejaVu (the paper's [22]): stereo video with known force. Writes left.mp4, right.mp4, calibration.yaml, truth.csv
+/// and what options.write asks for into `folder` (made if missing). The truth is in equilibrium in every frame
+/// (quasi-static, weightless, unstressed at rest); the patch of tissue that the instrument holds moves with it rigidly
+/// from grasp to release; a push slides with friction (see PushedTissue). `contact` gives the radius of the patch where
+/// the gesture does not, and the friction. `progress(done, total)` is called after every step. Throws BadInput before
+/// anything is written: gesture that misses the organ, tissue that finds no equilibrium, ...; Unfinished when a file
+/// cannot be written.
 DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOptions& tissue,
                               const AttachmentOptions& attachments, const ContactOptions& contact,
                               const std::filesystem::path& folder,

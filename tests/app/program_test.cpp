@@ -74,6 +74,18 @@ TEST(Program, CheckTellsWhatItReadInJson) {
   EXPECT_EQ(json["tissue"]["young_modulus_kPa"], 27);
 }
 
+TEST(Program, CheckSaysWhyAVideoWithoutInstrumentCannotPlaceATipTrack) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 3);
+  replace_in_file(workspace / "in/scene.yaml", "segmentation: colour", "track: tip.csv");
+  write_file(workspace / "in/tip.csv", "frame,time_s,x_mm,y_mm,z_mm\n0,0,1,2,90\n1,0.04,1,3,90\n");
+  const Outcome outcome = run_palpate("check " + (workspace / "in/scene.yaml").string() + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto track = nlohmann::json::parse(outcome.output)["track"];
+  EXPECT_NE(track["why_not"].get<std::string>().find("the video shows the tip in 0 frames"), std::string::npos);
+  EXPECT_FALSE(track.contains("time_offset_s"));
+}
+
 TEST(Program, VerbsThatAreNotThereYetSaySoAndEndWithTwo) {
   for (const char* verb : {"console"}) {
     const Outcome outcome = run_palpate(verb);
@@ -232,8 +244,8 @@ std::set<std::string> warnings_in_the_code() {
   return names;
 }
 
-TEST(ResultsPage, NamesEveryColumnStatusAndWarning) {
-  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/results.md");
+TEST(OutputsPage, NamesEveryColumnStatusAndWarning) {
+  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/outputs.md");
   const std::set<std::string> warnings = warnings_in_the_code();
   ASSERT_TRUE(warnings.count("law_out_of_range"));
   for (const std::string& name : warnings) {
