@@ -11,13 +11,16 @@ constexpr int kFewestPoints = 6;
 constexpr double kLeastTellingMotion_mm = 0.15;
 constexpr double kLeastFollowingShare = 0.35;
 
-/// Of the release detector: frames looked back; motion across the ray that tells, of the tip and predicted (RMS over
-/// the points): the depth of the tip jitters, and the model turns some of that into motion across the ray; the share of
-/// it that held tissue shows at least.
+/// Of the release detector: frames looked back; step of the tip across the ray that tells; the part of the tip's step
+/// that lies across the ray at least: the depth of the tip jitters, and the model turns some of that into motion across
+/// the ray; the share of the predicted step that held tissue shows at least: one standard deviation more is less.
 constexpr size_t kFramesBack = 3;
-constexpr double kLeastTipStep_mm = 0.3;
-constexpr double kLeastTellingStep_mm = 0.09;
-constexpr double kLeastFollowingStepShare = 0.2;
+constexpr double kLeastTipStep_mm = 0.12;
+constexpr double kLeastAcrossShare = 0.5;
+constexpr double kLeastFollowingStepShare = 0.25;
+/// Of the step of a tracked point across the ray; so many neighbours share their errors.
+constexpr double kStepDeviation_mm = 0.05;
+constexpr double kPointsThatAgree = 6;
 
 Vec3 across(const Vec3& motion, const Vec3& at) {
   const Vec3 ray = at.normalized();
@@ -62,7 +65,9 @@ bool ReleaseDetector::update(const Vec3& tip_mm, const std::vector<TissuePoint>&
   bool let_go = false;
   for (size_t back = 1; back <= frames_.size(); ++back) {
     const auto& [tip_before_mm, before] = frames_[frames_.size() - back];
-    if (across(tip_mm - tip_before_mm, tip_mm).norm() < kLeastTipStep_mm) continue;
+    const Vec3 tip_step = tip_mm - tip_before_mm;
+    const double tip_across_mm = across(tip_step, tip_mm).norm();
+    if (tip_across_mm < std::max(kLeastTipStep_mm, kLeastAcrossShare * tip_step.norm())) continue;
     int points = 0;
     double seen_predicted = 0, predicted_squared = 0;
     for (const auto& [number, motion] : now) {
@@ -73,8 +78,10 @@ bool ReleaseDetector::update(const Vec3& tip_mm, const std::vector<TissuePoint>&
       predicted_squared += step.squaredNorm();
       ++points;
     }
-    let_go |= points >= kFewestPoints && predicted_squared > points * kLeastTellingStep_mm * kLeastTellingStep_mm &&
-              seen_predicted < kLeastFollowingStepShare * predicted_squared;
+    const double deviation = kStepDeviation_mm * std::sqrt(kPointsThatAgree / predicted_squared);
+    // Tissue that goes the other way has not been let go in this step: a law that gives way predicts that.
+    let_go |=
+        points >= kFewestPoints && std::abs(seen_predicted) / predicted_squared + deviation < kLeastFollowingStepShare;
   }
   frames_.push_back({tip_mm, std::move(now)});
   if (frames_.size() > kFramesBack) frames_.pop_front();

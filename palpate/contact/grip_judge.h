@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "palpate/contact/contact_options.h"
@@ -7,37 +9,33 @@
 
 namespace palpate {
 
-/// What one frame says about two predictions of how the tissue moves.
-struct Leaning {
-  double share = 0.5;                ///< least-squares place of the seen motion between them: 0 = first, 1 = second
-  double deviation = kKnowsNothing;  ///< one standard deviation of it
-  static constexpr double kKnowsNothing = 1e6;
-};
-
-/// `first_mm`, `second_mm`: motion that each predicts at the rest position of each point.
-Leaning lean(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& first_mm,
-             const std::vector<Vec3>& second_mm);
-
-/// Tells how a tip holds the tissue, by what happens: a tip that presses and slides over the tissue pushes, one that
-/// takes the tissue along grasps it. Until then both give nearly the same force. A sequential probability ratio test
-/// (Wald 1945) over the frames of one contact: once told, it stays.
+/// Tells how a tip holds the tissue, by what happens: a tip that slides over the tissue or leaves it pushes, one that
+/// takes the tissue along grasps it. As long as both would move the tissue alike they give the same force and nothing
+/// can be told. Once told, it stays.
 class GripJudge {
  public:
   /// Begins a contact. Anything but `automatic` is known from the start.
   void start(Grip grip);
 
-  /// A frame in which the two differ: motion of the tissue if the tip only pushes, and if it holds.
+  /// One frame: motion of the tissue as predicted if the tip only pushes and if it holds, at the rest position of each
+  /// point. Compared is what has moved since both last agreed, so that what they have in common does not count.
   void update(const std::vector<TissuePoint>& seen, const std::vector<Vec3>& pushed_mm,
               const std::vector<Vec3>& grasped_mm);
 
   /// `automatic` as long as it cannot be told.
   Grip grip() const { return grip_; }
-  /// What speaks for a grasp so far, in natural logarithms of the odds; negative speaks for a push.
-  double evidence() const { return evidence_; }
+  /// Where between the two predictions the tissue was seen in the last frame that could tell: 0 = as pushed, 1 = as
+  /// grasped; nothing before.
+  const std::optional<double>& share() const { return share_; }
 
  private:
+  struct Motion {
+    Vec3 seen_mm, pushed_mm, grasped_mm;
+  };
   Grip grip_ = Grip::automatic;
-  double evidence_ = 0;
+  std::optional<double> share_;
+  int pushing_frames_ = 0, grasping_frames_ = 0;  // in a row
+  std::map<int, Motion> agreed_;                  // by number of the point; empty: at onset, when nothing had moved
 };
 
 }  // namespace palpate

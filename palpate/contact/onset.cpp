@@ -21,6 +21,8 @@ constexpr double kLeaveDistance_mm = 2;
 /// One frame may be a bad triangulation.
 constexpr int kFramesSurelyInside = 2;
 
+constexpr int kMostTimesTooEarly = 3;
+
 bool at_rest(const Vec3& before, const Vec3& now) {
   const Vec3 ray = now.normalized(), step = now - before;
   const double along = step.dot(ray);
@@ -46,7 +48,12 @@ bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& t
   return longest_step_mm > kApproachStep_mm && at_rest(recent_tips_[recent_tips_.size() - 2], recent_tips_.back());
 }
 
+bool OnsetDetector::may_begin_again() {
+  return ++times_too_early_ <= kMostTimesTooEarly;
+}
+
 void OnsetDetector::lose() {
+  times_too_early_ = 0;
   recent_tips_.clear();
 }
 

@@ -20,6 +20,9 @@ class OnsetDetector {
   /// free.
   bool update(double gap_mm, double gap_deviation_mm, const Vec3& tip_mm);
 
+  /// The contact that has just begun was too early: the tip had not come to rest yet. False when that has been so too
+  /// often for the tip to touch at all.
+  bool may_begin_again();
   /// The tip was lost: what it did before says nothing about what comes.
   void lose();
   /// The tip has let go at `tip_mm` and has to leave that place before it can touch again.
@@ -30,6 +33,7 @@ class OnsetDetector {
   std::optional<Vec3> let_go_at_mm_;
   std::deque<Vec3> recent_tips_;
   int frames_inside_ = 0;
+  int times_too_early_ = 0;
 };
 
 }  // namespace palpate

@@ -14,6 +14,15 @@ constexpr int kPressedFrames = 2;
 constexpr double kPressesAgain_mm = 0.2;
 constexpr double kAway_mm = 0.6;
 constexpr int kFewestFollowingPoints = 6;
+/// A tip that has come to rest does not go on like this in the first frames of a contact without the tissue.
+constexpr int kSettlingFrames = 4;
+constexpr double kUnsettledStep_mm = 0.3;
+/// Motion of the tissue (root mean square over the points) that can be told from its noise.
+constexpr double kTellingMotion_mm = 0.05;
+/// Between what a push and what a grasp predicts: nearer to which one the tissue moves.
+constexpr double kEvenShare = 0.35;
+/// Tissue beneath a push moves as the push says by more than this, or the tip is no longer there.
+constexpr double kLeastPushedShare = 0.15;
 
 }  // namespace
 
@@ -32,32 +41,55 @@ std::vector<Vec3> TipContact::predicted(const HeldContact::Answer& answer, const
   return displacement_at(held_.model(), held_.boundary(), answer.equilibrium.u, rest);
 }
 
-TipContact::Believed TipContact::believe(const Vec3& p, const std::vector<TissuePoint>& seen) {
-  const auto with_prediction = [&](HeldContact::Answer answer) -> Believed {
-    std::vector<Vec3> motion = predicted(answer, seen);
-    return {std::move(answer), std::move(motion)};
-  };
-  if (judge_.grip() == Grip::grasp) return with_prediction(held_.grasp(p));
-  if (judge_.grip() == Grip::push) return with_prediction(held_.push(p));
-  Believed grasped = with_prediction(held_.grasp(p));
-  Believed pushed = with_prediction(held_.push(p, &grasped.answer));
-  judge_.update(seen, pushed.predicted_mm, grasped.predicted_mm);
-  const bool has_pressed = pressed_frames_ >= kPressedFrames;
-  const bool rather_pushes = judge_.grip() == Grip::push || judge_.evidence() < 0 ||
-                             (judge_.evidence() == 0 && has_pressed && pushed.answer.let_go);
-  return rather_pushes ? pushed : grasped;
+TipContact::Believed TipContact::grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen) {
+  HeldContact::Answer answer = held_.grasp(p_mm);
+  std::vector<Vec3> motion = predicted(answer, seen);
+  if_held_ = compare_motion(seen, motion);
+  return {std::move(answer), std::move(motion)};
 }
 
-TipContact::State TipContact::state_of(const HeldContact::Answer& answer, double height_mm) {
-  pressed_frames_ += height_mm < -kPressed_mm;
-  const bool has_pressed = pressed_frames_ >= kPressedFrames;
+TipContact::Believed TipContact::pushed(const Vec3& p_mm, const std::vector<TissuePoint>& seen,
+                                        const HeldContact::Answer* tied) {
+  HeldContact::Answer answer = held_.push(p_mm, tied);
+  std::vector<Vec3> motion = predicted(answer, seen);
+  return {std::move(answer), std::move(motion)};
+}
+
+TipContact::Believed TipContact::believe(const Vec3& p_mm, const std::vector<TissuePoint>& seen) {
+  pushes_ = judge_.grip() == Grip::push;
+  if (pushes_) return pushed(p_mm, seen);
+  Believed if_grasped = grasped(p_mm, seen);
+  if (judge_.grip() == Grip::grasp) return if_grasped;
+  Believed if_pushed = pushed(p_mm, seen, &if_grasped.answer);
+  judge_.update(seen, if_pushed.predicted_mm, if_grasped.predicted_mm);
+  if (judge_.grip() != Grip::automatic) {
+    pushes_ = judge_.grip() == Grip::push;
+  } else {
+    // Nothing has told yet: a tip that has pressed and goes back lifts, any other that goes back pulls.
+    const double share = judge_.share().value_or(has_pressed() && if_pushed.answer.let_go ? 0 : 1);
+    pushes_ = share < kEvenShare;
+  }
+  return pushes_ ? if_pushed : if_grasped;
+}
+
+bool TipContact::has_pressed() const {
+  return pressed_frames_ >= kPressedFrames;
+}
+
+TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, double height_mm) {
   if (!answer.let_go && !(lifted_ && height_mm > -kPressesAgain_mm)) {
     lifted_ = false;
     return State::touching;
   }
   if (height_mm > kAway_mm) return State::over;
-  lifted_ = has_pressed;
+  lifted_ = has_pressed();
   return lifted_ ? State::lifted : State::touching;
+}
+
+bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const {
+  return frames_ <= kSettlingFrames && !has_pressed() && asked_for_ != Grip::push &&
+         (displacement_mm - last_displacement_mm_).norm() > kUnsettledStep_mm &&
+         if_held.predicted_mm > kTellingMotion_mm && if_held.share < kEvenShare && as_believed.share < kEvenShare;
 }
 
 void TipContact::move_footprint() {
@@ -70,13 +102,26 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   Answer result;
   result.tip_mm = touch_mm_ + displacement_mm;
   if (judge_.grip() == Grip::push && held_.has_left_its_footprint()) move_footprint();
-  const Vec3 p = result.tip_mm - held_.footprint().center_mm;
-  Believed believed = believe(p, seen);
+  const Vec3 p_mm = result.tip_mm - held_.footprint().center_mm;
+  const double height_mm = p_mm.dot(held_.footprint().normal);
+  ++frames_;
+  pressed_frames_ += height_mm < -kPressed_mm;
+  Believed believed = believe(p_mm, seen);
   const Follow follow = compare_motion(seen, believed.predicted_mm);
-  result.state = state_of(believed.answer, p.dot(held_.footprint().normal));
-  const bool stays_behind = judge_.grip() != Grip::push && release_.update(result.tip_mm, seen, believed.predicted_mm);
-  const bool cannot_tell = has_to_be_seen && follow.points < kFewestFollowingPoints;
-  if (follow.let_go || stays_behind || cannot_tell) result.state = State::over;
+  const bool unsettled = is_unsettled(displacement_mm, if_held_, believed.answer.let_go ? if_held_ : follow);
+  last_displacement_mm_ = displacement_mm;
+  bool let_go = has_to_be_seen && follow.points < kFewestFollowingPoints;
+  if (judge_.grip() == Grip::grasp)
+    let_go |= follow.let_go | release_.update(result.tip_mm, seen, believed.predicted_mm);
+  else if (pushes_ && !believed.answer.let_go)
+    let_go |= follow.let_go && follow.share < kLeastPushedShare;
+  if (pushes_) {
+    result.state = state_of_push(believed.answer, height_mm);
+  } else {
+    lifted_ = false;
+  }
+  if (let_go) result.state = State::over;
+  if (unsettled) result.state = State::unsettled;
   result.misfit_mm = follow.misfit_mm;
   result.slid = believed.answer.slid;
   result.equilibrium = std::move(believed.answer.equilibrium);

@@ -20,9 +20,10 @@ class TipContact {
   TipContact(HoldAt hold_at, const Vec3& touch_mm, Grip grip);
 
   enum class State {
-    touching,  ///< the tip acts on the tissue
-    lifted,    ///< a push that is off the tissue, but not yet away from it
-    over       ///< let go; nothing more is to be asked
+    touching,   ///< the tip acts on the tissue
+    lifted,     ///< a push that is off the tissue, but not yet away from it
+    unsettled,  ///< the tip had not come to rest yet when the contact began (jaws that still closed): begin anew
+    over        ///< let go; nothing more is to be asked
   };
   struct Answer {
     State state = State::touching;
@@ -46,9 +47,13 @@ class TipContact {
     HeldContact::Answer answer;
     std::vector<Vec3> predicted_mm;
   };
-  Believed believe(const Vec3& from_footprint_mm, const std::vector<TissuePoint>& seen);
+  Believed pushed(const Vec3& p_mm, const std::vector<TissuePoint>& seen, const HeldContact::Answer* tied = nullptr);
+  Believed grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
+  Believed believe(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
   std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const;
-  State state_of(const HeldContact::Answer& answer, double height_mm);
+  State state_of_push(const HeldContact::Answer& answer, double height_mm);
+  bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
+  bool has_pressed() const;
   void move_footprint();
 
   HoldAt hold_at_;
@@ -57,8 +62,11 @@ class TipContact {
   Grip asked_for_;
   GripJudge judge_;
   ReleaseDetector release_;
-  int pressed_frames_ = 0;
+  Vec3 last_displacement_mm_ = Vec3::Zero();
+  int frames_ = 0, pressed_frames_ = 0;
+  bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;
+  Follow if_held_;  // how the tissue follows if the tip holds it; where that was asked for in this frame
 };
 
 }  // namespace palpate

@@ -137,7 +137,12 @@ struct ForceEstimator::State {
     const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);
     const std::vector<TissuePoint> seen = tissue_motion.update(pair, instruments.left_mask, instruments.right_mask);
     TipContact::Answer answer = contact->update(p, seen, lost_frames > kFlickerFrames);
-    if (answer.state == TipContact::State::over) end_contact(tip.tip_mm);
+    if (answer.state == TipContact::State::unsettled && onset.may_begin_again()) {
+      begin_contact(pair, instruments, gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary));
+      answer = contact->update(Vec3::Zero(), {});
+    }
+    if (answer.state == TipContact::State::over || answer.state == TipContact::State::unsettled)
+      end_contact(tip.tip_mm);
     if (answer.state != TipContact::State::touching) return std::nullopt;
     estimate.tip_mm = answer.tip_mm;
     estimate.misfit_mm = answer.misfit_mm;
