@@ -1,9 +1,8 @@
 #include "palpate/simulate/baked_texture.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+#include <thread>
 
 namespace palpate {
 namespace {
@@ -21,57 +20,72 @@ int texel_count(int steps) {
 
 }  // namespace
 
-BakedTexture::BakedTexture(const Surface& rest, const Texture& texture, double texels_per_mm) {
-  const std::vector<Vec3> normals = vertex_normals(rest.vertices_mm, rest.triangles);
+BakedTexture::BakedTexture(const Surface& rest, const Texture& texture, double texels_per_mm)
+    : rest_(rest),
+      normals_(vertex_normals(rest.vertices_mm, rest.triangles)),
+      texture_(texture),
+      grids_(rest.triangles.size()) {
   int total = 0;
-  for (const auto& [a, b, c] : rest.triangles) {
-    const Vec3& pa = rest.vertices_mm[static_cast<size_t>(a)];
-    const Vec3& pb = rest.vertices_mm[static_cast<size_t>(b)];
-    const Vec3& pc = rest.vertices_mm[static_cast<size_t>(c)];
-    const double longest = std::max({(pb - pa).norm(), (pc - pb).norm(), (pa - pc).norm()});
+  for (size_t t = 0; t < grids_.size(); ++t) {
+    const auto corner = [&](size_t k) -> const Vec3& {
+      return rest.vertices_mm[static_cast<size_t>(rest.triangles[t][k])];
+    };
+    const double longest =
+        std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
     const int steps = std::clamp(static_cast<int>(std::ceil(longest * texels_per_mm)), 1, kMostSteps);
-    grids_.push_back({total, steps});
+    grids_[t].first = total;
+    grids_[t].steps = static_cast<unsigned short>(steps);
     total += texel_count(steps);
   }
   texels_.resize(static_cast<size_t>(total));
-  tbb::parallel_for(size_t{0}, rest.triangles.size(), [&](size_t t) {
-    const Grid& grid = grids_[t];
-    const auto corner = [&](const std::vector<Vec3>& values, size_t k) -> const Vec3& {
-      return values[static_cast<size_t>(rest.triangles[t][k])];
-    };
-    const auto between = [&](const std::vector<Vec3>& values, double u, double v) -> Vec3 {
-      return (1 - u - v) * corner(values, 0) + u * corner(values, 1) + v * corner(values, 2);
-    };
-    for (int j = 0; j <= grid.steps; ++j)
-      for (int i = 0; i + j <= grid.steps; ++i) {
-        const double u = static_cast<double>(i) / grid.steps, v = static_cast<double>(j) / grid.steps;
-        texels_[static_cast<size_t>(grid.first + place(grid.steps, i, j))] =
-            texture(between(rest.vertices_mm, u, v), between(normals, u, v).normalized());
-      }
-  });
 }
 
-Texel BakedTexture::at(int triangle, float u, float v) const {
-  const Grid& grid = grids_[static_cast<size_t>(triangle)];
-  const float x = std::clamp(u, 0.0f, 1.0f) * static_cast<float>(grid.steps);
-  const float y = std::clamp(v, 0.0f, 1.0f) * static_cast<float>(grid.steps);
-  const int j = std::min(static_cast<int>(y), grid.steps - 1);
-  const int i = std::min(static_cast<int>(x), grid.steps - 1 - j);
-  float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j);
-  const auto texel = [&](int a, int b) -> const Texel& {
-    return texels_[static_cast<size_t>(grid.first + place(grid.steps, a, b))];
-  };
-  const bool upper = fx + fy > 1 && i + j + 2 <= grid.steps;
-  const Texel& p = upper ? texel(i + 1, j + 1) : texel(i, j);
-  const Texel& q = upper ? texel(i, j + 1) : texel(i + 1, j);
-  const Texel& r = upper ? texel(i + 1, j) : texel(i, j + 1);
-  if (upper) {
-    fx = 1 - fx;
-    fy = 1 - fy;
+void BakedTexture::bake(size_t triangle) const {
+  const Grid& grid = grids_[triangle];
+  State expected = State::unknown;
+  if (!grid.state.compare_exchange_strong(expected, State::in_work)) {
+    while (grid.state.load(std::memory_order_acquire) != State::known) std::this_thread::yield();
+    return;
   }
+  const auto corner = [&](const std::vector<Vec3>& values, size_t k) -> const Vec3& {
+    return values[static_cast<size_t>(rest_.triangles[triangle][k])];
+  };
+  const auto between = [&](const std::vector<Vec3>& values, double u, double v) -> Vec3 {
+    return (1 - u - v) * corner(values, 0) + u * corner(values, 1) + v * corner(values, 2);
+  };
+  const int steps = grid.steps;
+  for (int j = 0; j <= steps; ++j)
+    for (int i = 0; i + j <= steps; ++i) {
+      const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
+      texels_[static_cast<size_t>(grid.first + place(steps, i, j))] =
+          texture_(between(rest_.vertices_mm, u, v), between(normals_, u, v).normalized());
+    }
+  grid.state.store(State::known, std::memory_order_release);
+}
+
+BakedTexture::Spot BakedTexture::spot(int triangle, float u, float v) const {
+  const Grid& grid = grids_[static_cast<size_t>(triangle)];
+  if (grid.state.load(std::memory_order_acquire) != State::known) bake(static_cast<size_t>(triangle));
+  const int steps = grid.steps;
+  const float x = std::clamp(u, 0.0f, 1.0f) * static_cast<float>(steps);
+  const float y = std::clamp(v, 0.0f, 1.0f) * static_cast<float>(steps);
+  const int j = std::min(static_cast<int>(y), steps - 1);
+  const int i = std::min(static_cast<int>(x), steps - 1 - j);
+  const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j);
+  const auto texel = [&](int a, int b) { return &texels_[static_cast<size_t>(grid.first + place(steps, a, b))]; };
+  const bool upper = fx + fy > 1 && i + j + 2 <= steps;
+  const Spot found = upper ? Spot{texel(i + 1, j + 1), texel(i, j + 1), texel(i + 1, j), 1 - fx, 1 - fy}
+                           : Spot{texel(i, j), texel(i + 1, j), texel(i, j + 1), fx, fy};
+  __builtin_prefetch(found.p);
+  __builtin_prefetch(found.q);
+  __builtin_prefetch(found.r);
+  return found;
+}
+
+Texel BakedTexture::Spot::texel() const {
   Texel mixed;
-  mixed.albedo = p.albedo + fx * (q.albedo - p.albedo) + fy * (r.albedo - p.albedo);
-  mixed.slope = p.slope + fx * (q.slope - p.slope) + fy * (r.slope - p.slope);
+  mixed.albedo = p->albedo + toward_q * (q->albedo - p->albedo) + toward_r * (r->albedo - p->albedo);
+  mixed.slope = p->slope + toward_q * (q->slope - p->slope) + toward_r * (r->slope - p->slope);
   return mixed;
 }
 

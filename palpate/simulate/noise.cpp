@@ -16,19 +16,28 @@ const std::array<Eigen::Vector3f, 16> kDirections = [] {
   return d;
 }();
 
-}  // namespace
+// hash_bits, step by step: neighbouring corners of a lattice share the first ones.
+uint32_t begun(uint32_t seed) {
+  return seed * 0x9E3779B9u + 0x7F4A7C15u;
+}
 
-uint32_t hash_bits(uint32_t a, uint32_t b, uint32_t c, uint32_t seed) {
-  uint32_t h = seed * 0x9E3779B9u + 0x7F4A7C15u;
-  for (const uint32_t k : {a, b, c}) {
-    h ^= k * 0xCC9E2D51u;
-    h = (h << 13 | h >> 19) * 5u + 0xE6546B64u;
-  }
+uint32_t stirred(uint32_t h, uint32_t k) {
+  h ^= k * 0xCC9E2D51u;
+  return (h << 13 | h >> 19) * 5u + 0xE6546B64u;
+}
+
+uint32_t finished(uint32_t h) {
   h ^= h >> 16;
   h *= 0x85EBCA6Bu;
   h ^= h >> 13;
   h *= 0xC2B2AE35u;
   return h ^ (h >> 16);
+}
+
+}  // namespace
+
+uint32_t hash_bits(uint32_t a, uint32_t b, uint32_t c, uint32_t seed) {
+  return finished(stirred(stirred(stirred(begun(seed), a), b), c));
 }
 
 FieldValue gradient_noise(const Eigen::Vector3f& point, uint32_t seed) {
@@ -39,12 +48,16 @@ FieldValue gradient_noise(const Eigen::Vector3f& point, uint32_t seed) {
   const Eigen::Array3f fade = a * a * a * (a * (a * 6 - 15) + 10);
   const Eigen::Array3f slope = 30 * a * a * (a * (a - 2) + 1);
 
+  std::array<uint32_t, 4> along_xy{};
+  for (int k = 0; k < 4; ++k) {
+    const uint32_t along_x = stirred(begun(seed), static_cast<uint32_t>(corner.x() + (k & 1)));
+    along_xy[static_cast<size_t>(k)] = stirred(along_x, static_cast<uint32_t>(corner.y() + (k >> 1)));
+  }
   FieldValue sum;
   for (int k = 0; k < 8; ++k) {
     const Eigen::Vector3i o(k & 1, k >> 1 & 1, k >> 2);
-    const Eigen::Vector3i at = corner + o;
     const uint32_t bits =
-        hash_bits(static_cast<uint32_t>(at.x()), static_cast<uint32_t>(at.y()), static_cast<uint32_t>(at.z()), seed);
+        finished(stirred(along_xy[static_cast<size_t>(k & 3)], static_cast<uint32_t>(corner.z() + o.z())));
     const Eigen::Vector3f& direction = kDirections[bits & 15];
     const float dot = direction.dot(t - o.cast<float>());
     const Eigen::Array3f w(o.x() ? fade.x() : 1 - fade.x(), o.y() ? fade.y() : 1 - fade.y(),

@@ -78,14 +78,15 @@ struct Renderer::Scene {
   }
 
   // Light that leaves a point towards the eye, apart from what stands between it and the light.
-  Lit light_up(const RayHit& hit, const Vec3f& point, const Vec3f& to_eye, uint32_t bits) const {
+  Lit light_up(const RayHit& hit, const BakedTexture::Spot& spot, const Vec3f& point, const Vec3f& to_eye,
+               uint32_t bits) const {
     const DrawnSurface& surface = surfaces[static_cast<size_t>(hit.surface)];
     const Triangle& triangle = surface.triangles[static_cast<size_t>(hit.triangle)];
     const auto normal_at = [&](size_t k) -> const Vec3f& { return surface.normals[static_cast<size_t>(triangle[k])]; };
     Vec3f smooth = (1 - hit.u - hit.v) * normal_at(0) + hit.u * normal_at(1) + hit.v * normal_at(2);
     smooth.normalize();
     if (smooth.dot(to_eye) < 0) smooth = -smooth;
-    const Texel texel = surface.texture.at(hit.triangle, hit.u, hit.v);
+    const Texel texel = spot.texel();
     const Vec3f normal = (smooth - texel.slope + smooth * smooth.dot(texel.slope)).normalized();
 
     Lit lit;
@@ -112,6 +113,11 @@ struct Renderer::Scene {
     for (size_t i = 0; i < kBundle; ++i) directions[i] = ray_direction(x_px[i], y_px[i]);
     Bundle<RayHit> hits;
     rays.first_hits(origin, directions, hits);
+    // All spots before the first is read: the texture is larger than the caches.
+    Bundle<BakedTexture::Spot> spots;
+    for (size_t i = 0; i < kBundle; ++i)
+      if (hits[i].surface >= 0)
+        spots[i] = surfaces[static_cast<size_t>(hits[i].surface)].texture.spot(hits[i].triangle, hits[i].u, hits[i].v);
     Bundle<Lit> lit;
     Bundle<bool> faces_light;
     for (size_t i = 0; i < kBundle; ++i) {
@@ -119,7 +125,8 @@ struct Renderer::Scene {
         const auto eighths = [](float px) { return static_cast<uint32_t>(static_cast<int>(std::lround(8 * px))); };
         const uint32_t bits = hash_bits(eighths(x_px[i]), eighths(y_px[i]), 2 * frame + static_cast<uint32_t>(eye),
                                         static_cast<uint32_t>(look.seed));
-        lit[i] = light_up(hits[i], origin + hits[i].length * directions[i], -directions[i].normalized(), bits);
+        lit[i] =
+            light_up(hits[i], spots[i], origin + hits[i].length * directions[i], -directions[i].normalized(), bits);
       }
       from[i] = lit[i].start;
       to[i] = lit[i].light_point;

@@ -25,12 +25,20 @@ float srgb(float light) {
 const int kTableSteps = 8192;
 const float kTableEnd = 4;
 
-// Levels 0..255 of light 0..kTableEnd, finer in the dark (square-root spacing).
-std::array<float, kTableSteps + 1> level_table() {
-  std::array<float, kTableSteps + 1> table{};
+struct Level {
+  float level;      // 0..255
+  float deviation;  // of its noise
+};
+
+// Light 0..kTableEnd, finer in the dark (square-root spacing).
+std::array<Level, kTableSteps + 1> level_table(const SimulatedNoise& noise) {
+  const float read2 = static_cast<float>(noise.read_levels * noise.read_levels);
+  const float shot2 = static_cast<float>(noise.shot_levels * noise.shot_levels) / 255;
+  std::array<Level, kTableSteps + 1> table{};
   for (int i = 0; i <= kTableSteps; ++i) {
     const float root = static_cast<float>(i) / kTableSteps;
-    table[static_cast<size_t>(i)] = 255 * srgb(compressed(root * root * kTableEnd));
+    const float level = 255 * srgb(compressed(root * root * kTableEnd));
+    table[static_cast<size_t>(i)] = {level, std::sqrt(read2 + shot2 * level)};
   }
   return table;
 }
@@ -50,18 +58,16 @@ float light_from_level(float level) {
 }
 
 cv::Mat sensor_image(const cv::Mat& linear_bgr, const SimulatedNoise& noise, uint32_t seed) {
-  const auto table = level_table();
-  const float read2 = static_cast<float>(noise.read_levels * noise.read_levels);
-  const float shot2 = static_cast<float>(noise.shot_levels * noise.shot_levels) / 255;
+  const auto table = level_table(noise);
   cv::Mat image(linear_bgr.size(), CV_8UC3);
   tbb::parallel_for(0, image.rows, [&](int y) {
     const auto* light = linear_bgr.ptr<float>(y);
     auto* out = image.ptr<uchar>(y);
     for (int i = 0; i < 3 * image.cols; ++i) {
       const float root = std::sqrt(std::clamp(light[i] / kTableEnd, 0.0f, 1.0f));
-      const float level = table[static_cast<size_t>(root * kTableSteps + 0.5f)];
+      const auto& [level, deviation] = table[static_cast<size_t>(root * kTableSteps + 0.5f)];
       const uint32_t bits = hash_bits(static_cast<uint32_t>(i), static_cast<uint32_t>(y), 17, seed);
-      const float noisy = level + std::sqrt(read2 + shot2 * level) * normal_from(bits);
+      const float noisy = level + deviation * normal_from(bits);
       out[i] = cv::saturate_cast<uchar>(noisy);
     }
   });
