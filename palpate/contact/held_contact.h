@@ -3,25 +3,24 @@
 #include <memory>
 
 #include "palpate/contact/contact_options.h"
-#include "palpate/contact/equilibrium.h"
+#include "palpate/contact/touched_body.h"
 
 namespace palpate {
 
-/// A tip on the tissue, from onset to release: the body (refined around the footprint by the caller), its footprint,
-/// the equilibrium of Eq. 3 and what each grip makes of the tip's path. Displacements are those of the tip from the
-/// footprint's rest position, left camera frame.
+/// A tip on the tissue, from onset to release: its footprint on a body that it may share with other tips, and what each
+/// grip makes of the tip's path. Displacements are those of the tip from the footprint's rest position, left camera
+/// frame.
 class HeldContact {
  public:
-  /// `touch_mm`: where the tip met the surface at rest. `fixed_nodes`: attachments of `mesh`.
-  HeldContact(const TetMesh& mesh, const std::vector<int>& fixed_nodes, const TissueOptions& tissue,
-              const Vec3& touch_mm, const ContactOptions& options, Element element = Element::averaged);
+  /// `touch_mm`: where the tip met the surface, as a place of the surface at rest.
+  HeldContact(std::shared_ptr<TouchedBody> body, const Vec3& touch_mm, const ContactOptions& options);
   ~HeldContact();
   HeldContact(HeldContact&&) noexcept;
   HeldContact& operator=(HeldContact&&) noexcept;
 
   struct Answer {
     Equilibrium equilibrium;
-    bool let_go = false;  ///< a push whose tip is off the tissue, which is at rest
+    bool let_go = false;  ///< a push whose tip is off the tissue
     bool slid = false;    ///< a push at the edge of its friction cone
   };
 
@@ -36,13 +35,19 @@ class HeldContact {
   Answer move(const Vec3& displacement_mm);
 
   /// Where the tip stands on the surface at rest, left camera frame: the middle of the footprint, from where a push has
-  /// slid. The footprint itself stays; from half its radius on the contact is better begun anew at this place.
+  /// slid.
   const Vec3& place_mm() const;
+  /// A push has slid so far that it stands on other tissue than its footprint.
   bool has_left_its_footprint() const;
+  /// The footprint lies where the tip stands from now on.
+  void move_footprint();
 
-  const TetModel& model() const;
-  const std::vector<Triangle>& boundary() const;
+  const TouchedBody& body() const;
+  /// Of this tip on the body.
+  int number() const;
   const Footprint& footprint() const;
+  /// By how much another tip had displaced the tissue where this one touched.
+  const Vec3& displaced_at_begin_mm() const;
   /// An attachment lies within two footprint radii: the stress there is cut off and the force not to be trusted.
   bool near_attachment() const;
 

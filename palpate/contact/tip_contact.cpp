@@ -26,11 +26,8 @@ constexpr double kLeastPushedShare = 0.15;
 
 }  // namespace
 
-TipContact::TipContact(HoldAt hold_at, const Vec3& touch_mm, Grip grip)
-    : hold_at_(std::move(hold_at)),
-      held_(hold_at_(touch_mm)),
-      touch_mm_(held_.footprint().center_mm),
-      asked_for_(grip) {
+TipContact::TipContact(HeldContact held, Grip grip)
+    : held_(std::move(held)), touch_mm_(held_.footprint().center_mm + held_.displaced_at_begin_mm()), asked_for_(grip) {
   judge_.start(grip);
   release_.start();
 }
@@ -38,7 +35,7 @@ TipContact::TipContact(HoldAt hold_at, const Vec3& touch_mm, Grip grip)
 std::vector<Vec3> TipContact::predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const {
   std::vector<Vec3> rest;
   for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
-  return displacement_at(held_.model(), held_.boundary(), answer.equilibrium.u, rest);
+  return displacement_at(held_.body().model(), held_.body().boundary(), answer.equilibrium.u, rest);
 }
 
 TipContact::Believed TipContact::grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen) {
@@ -92,16 +89,14 @@ bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held
          if_held.predicted_mm > kTellingMotion_mm && if_held.share < kEvenShare && as_believed.share < kEvenShare;
 }
 
-void TipContact::move_footprint() {
-  held_ = hold_at_(held_.place_mm());
-  release_.start();
-}
-
 TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::vector<TissuePoint>& seen,
                                       bool has_to_be_seen) {
   Answer result;
   result.tip_mm = touch_mm_ + displacement_mm;
-  if (judge_.grip() == Grip::push && held_.has_left_its_footprint()) move_footprint();
+  if (judge_.grip() == Grip::push && held_.has_left_its_footprint()) {
+    held_.move_footprint();
+    release_.start();
+  }
   const Vec3 p_mm = result.tip_mm - held_.footprint().center_mm;
   const double height_mm = p_mm.dot(held_.footprint().normal);
   ++frames_;

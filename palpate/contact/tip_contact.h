@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 
 #include "palpate/contact/follow.h"
@@ -13,11 +12,8 @@ namespace palpate {
 /// whether it still does, and the equilibrium that follows.
 class TipContact {
  public:
-  /// A body refined around a place of the surface at rest, held there.
-  using HoldAt = std::function<HeldContact(const Vec3& place_mm)>;
-
-  /// `touch_mm`: where the tip met the surface at rest.
-  TipContact(HoldAt hold_at, const Vec3& touch_mm, Grip grip);
+  /// `held`: begun where the tip met the surface.
+  TipContact(HeldContact held, Grip grip);
 
   enum class State {
     touching,   ///< the tip acts on the tissue
@@ -37,7 +33,6 @@ class TipContact {
   /// `has_to_be_seen`: the tip was away for so long that it only holds if the tissue shows it.
   Answer update(const Vec3& displacement_mm, const std::vector<TissuePoint>& seen, bool has_to_be_seen = false);
 
-  /// The body in its present place.
   const HeldContact& held() const { return held_; }
   /// `automatic` as long as it cannot be told.
   Grip grip() const { return judge_.grip(); }
@@ -54,9 +49,7 @@ class TipContact {
   State state_of_push(const HeldContact::Answer& answer, double height_mm);
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
-  void move_footprint();
 
-  HoldAt hold_at_;
   HeldContact held_;
   Vec3 touch_mm_;
   Grip asked_for_;

@@ -65,6 +65,7 @@ struct ForceEstimator::State {
   std::array<cv::Mat, 2> last_pictures;
   OnsetDetector onset;
   TissueMotion tissue_motion;
+  std::shared_ptr<TouchedBody> body;
   std::optional<TipContact> contact;
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
@@ -82,7 +83,10 @@ struct ForceEstimator::State {
         tracker(instrument, rectification, rectify(rectification, static_frame), map.organ_mask),
         map_watch(rectify(rectification, static_frame).left, {}),
         onset(contact_options.threshold_mm),
-        tissue_motion(rectification) {}
+        tissue_motion(rectification) {
+    const auto around = [this](const std::vector<Vec3>& places_mm) { return mesh_around(places_mm); };
+    body = std::make_shared<TouchedBody>(around, map.tissue, map.element, options.footprint_radius_mm);
+  }
 
   bool is_repeated(const RectifiedPair& pair) {
     std::array<cv::Mat, 2> pictures = {every_fourth_pixel(pair.left), every_fourth_pixel(pair.right)};
@@ -90,17 +94,22 @@ struct ForceEstimator::State {
     return same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
   }
 
-  HeldContact hold_at(const Vec3& place_mm) const {
+  /// The map, finer around places that are touched.
+  AttachedMesh mesh_around(const std::vector<Vec3>& places_mm) const {
     const double radius_mm = options.footprint_radius_mm;
-    const TetMesh refined =
-        refine_near(map.mesh, place_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
-    const std::vector<int> fixed = select_attachments(
-        refined, attachments, [this](const Vec3& point) { return project_to_recorded_left(rectification.rig, point); });
-    return HeldContact(refined, fixed, map.tissue, place_mm, options, map.element);
+    AttachedMesh attached{map.mesh, {}};
+    for (const Vec3& place_mm : places_mm)
+      attached.mesh =
+          refine_near(attached.mesh, place_mm, kFootprintReach * radius_mm, kFootprintEdgeShare * radius_mm);
+    attached.fixed_nodes = select_attachments(attached.mesh, attachments, [this](const Vec3& point) {
+      return project_to_recorded_left(rectification.rig, point);
+    });
+    return attached;
   }
 
   void begin_contact(const RectifiedPair& pair, const InstrumentObservations& seen, const Gap& gap) {
-    contact.emplace([this](const Vec3& place_mm) { return hold_at(place_mm); }, gap.surface_point_mm, options.grip);
+    contact.reset();
+    contact.emplace(HeldContact(body, gap.surface_point_mm, options), options.grip);
     onset_tip_mm = seen.tips[0].tip_mm;
     tracker.mark(0);
     tissue_motion.start(pair, seen.left_mask, gap.surface_point_mm,
@@ -155,15 +164,15 @@ struct ForceEstimator::State {
     estimate.residual = equilibrium.residual;
     estimate.status = FrameStatus::not_converged;
     if (contact->held().near_attachment()) estimate.warnings.push_back("near_attachment");
-    if (!contact->held().model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
+    if (!body->model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
     // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
     if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
     if (!equilibrium.converged) return;
     estimate.status = estimate.misfit_mm > kStaleMisfit_mm ? FrameStatus::map_stale : FrameStatus::ok;
     estimate.force_N = equilibrium.force_N;
     estimate.mean_nodal_force_N = equilibrium.mean_nodal_force_N;
-    estimate.deformed_nodes_mm = deformed(contact->held().model(), equilibrium.u);
-    estimate.boundary = contact->held().boundary();
+    estimate.deformed_nodes_mm = deformed(body->model(), equilibrium.u);
+    estimate.boundary = body->boundary();
   }
 };
 
@@ -227,7 +236,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   s.report(*equilibrium, estimate);
   if (stale && estimate.status == FrameStatus::ok) estimate.status = FrameStatus::map_stale;
   if (estimate.status == FrameStatus::not_converged) return estimate;
-  estimate.node_von_mises_kPa = node_von_mises_kPa(s.contact->held().model(), equilibrium->u);
+  estimate.node_von_mises_kPa = node_von_mises_kPa(s.body->model(), equilibrium->u);
   estimate.max_von_mises_kPa =
       *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
   estimate.times.stress_ms = watch.lap_ms();

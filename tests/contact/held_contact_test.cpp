@@ -17,7 +17,12 @@ struct Block {
     options.grip = grip;
     options.friction = friction;
     options.footprint_radius_mm = 5;
-    return HeldContact(mesh, clamped, {Law::neo_hookean, 27, 0.45, ""}, {20, 20, 0}, options, Element::averaged);
+    return HeldContact(body(options.footprint_radius_mm), {20, 20, 0}, options);
+  }
+  std::shared_ptr<TouchedBody> body(double radius_mm) const {
+    const auto as_it_is = [*this](const std::vector<Vec3>&) -> AttachedMesh { return {mesh, clamped}; };
+    const TissueOptions tissue{Law::neo_hookean, 27, 0.45, ""};
+    return std::make_shared<TouchedBody>(as_it_is, tissue, Element::averaged, radius_mm);
   }
 };
 

@@ -55,7 +55,8 @@ class Scene {
     }
     std::vector<Vec3> moved(at.size(), Vec3::Zero());
     const HeldContact& truth = truth_.held();
-    if (is_touched) moved = displacement_at(truth.body().model(), truth.body().boundary(), true_answer_.equilibrium.u, at);
+    if (is_touched)
+      moved = displacement_at(truth.body().model(), truth.body().boundary(), true_answer_.equilibrium.u, at);
     for (size_t i = 0; i < at.size(); ++i) {
       const double phase = 7.0 * static_cast<double>(i) + 3.1 * frame_;
       const Vec3 noise(0.02 * std::sin(phase), 0.02 * std::cos(1.7 * phase), 0.15 * std::sin(2.3 * phase));
