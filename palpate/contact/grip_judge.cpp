@@ -18,7 +18,7 @@ constexpr double kSame_mm = 0.02;
 constexpr double kTellingDeviation = 0.3;
 /// Tissue that is held follows less than the model says where the body is thicker or softer than assumed; tissue that
 /// is not held stays.
-constexpr double kMostPushingShare = 0.3, kLeastGraspingShare = 0.45;
+constexpr double kMostPushingShare = 0.2, kLeastGraspingShare = 0.3;
 constexpr int kFramesToTell = 2;
 
 /// Along the viewing ray a displacement is known far worse than across it: a vector, weighted by the information.

@@ -76,6 +76,10 @@ HeldContact::Answer HeldContact::push(const Vec3& displacement_mm, const Answer*
   return state_->push(displacement_mm, tied);
 }
 
+void HeldContact::raise_friction(double coefficient) {
+  state_->options.friction = std::max(state_->options.friction, coefficient);
+}
+
 HeldContact::Answer HeldContact::move(const Vec3& displacement_mm) {
   return state_->options.grip == Grip::push ? push(displacement_mm) : grasp(displacement_mm);
 }

@@ -31,6 +31,9 @@ class HeldContact {
   /// already; within the cone and without a slide before, both are the same.
   Answer push(const Vec3& displacement_mm, const Answer* tied = nullptr);
 
+  /// The coefficient of friction was seen to be at least this.
+  void raise_friction(double coefficient);
+
   /// As the options' grip says; `automatic` ties.
   Answer move(const Vec3& displacement_mm);
 

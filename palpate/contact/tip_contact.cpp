@@ -10,9 +10,10 @@ namespace {
 /// A tip has pressed when it was so deep in so many frames; before, it only touches, and retreats by its own noise.
 constexpr double kPressed_mm = 0.3;
 constexpr int kPressedFrames = 2;
-/// A lifted tip that comes so deep again presses again; one so far above the surface has left it.
+/// A lifted tip that comes so deep again presses again; one so far above the surface has left it, unless it may still
+/// turn out to take the tissue along.
 constexpr double kPressesAgain_mm = 0.2;
-constexpr double kAway_mm = 0.6;
+constexpr double kAway_mm = 0.6, kAwayUntold_mm = 1.5;
 constexpr int kFewestFollowingPoints = 6;
 /// A tip that has come to rest does not go on like this in the first frames of a contact without the tissue.
 constexpr int kSettlingFrames = 4;
@@ -20,7 +21,7 @@ constexpr double kUnsettledStep_mm = 0.3;
 /// Motion of the tissue (root mean square over the points) that can be told from its noise.
 constexpr double kTellingMotion_mm = 0.05;
 /// Between what a push and what a grasp predicts: nearer to which one the tissue moves.
-constexpr double kEvenShare = 0.35;
+constexpr double kEvenShare = 0.25;
 /// Tissue beneath a push moves as the push says by more than this, or the tip is no longer there.
 constexpr double kLeastPushedShare = 0.15;
 
@@ -78,9 +79,16 @@ TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, d
     lifted_ = false;
     return State::touching;
   }
-  if (height_mm > kAway_mm) return State::over;
+  if (height_mm > (judge_.grip() == Grip::push ? kAway_mm : kAwayUntold_mm)) return State::over;
   lifted_ = has_pressed();
   return lifted_ ? State::lifted : State::touching;
+}
+
+/// Tangential over normal force; 0 where it does not press.
+double TipContact::friction_of(const HeldContact::Answer& answer) const {
+  const Vec3 &force_N = answer.equilibrium.force_N, &normal = held_.footprint().normal;
+  const double normal_N = -force_N.dot(normal);
+  return normal_N > 0 ? (force_N + normal_N * normal).norm() / normal_N : 0;
 }
 
 bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const {
@@ -110,6 +118,15 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
     let_go |= follow.let_go | release_.update(result.tip_mm, seen, believed.predicted_mm);
   else if (pushes_ && !believed.answer.let_go)
     let_go |= follow.let_go && follow.share < kLeastPushedShare;
+  // A tip that loses hold of the tissue while it presses on it slides: what held it so far was friction.
+  if (let_go && judge_.grip() == Grip::grasp && asked_for_ == Grip::automatic && height_mm < -kPressed_mm) {
+    judge_.start(Grip::push);
+    held_.raise_friction(held_friction_);
+    pushes_ = true;
+    believed = pushed(p_mm, seen);
+    let_go = false;
+  }
+  held_friction_ = friction_of(believed.answer);
   if (pushes_) {
     result.state = state_of_push(believed.answer, height_mm);
   } else {

@@ -49,6 +49,7 @@ class TipContact {
   State state_of_push(const HeldContact::Answer& answer, double height_mm);
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
+  double friction_of(const HeldContact::Answer& answer) const;
 
   HeldContact held_;
   Vec3 touch_mm_;
@@ -59,7 +60,8 @@ class TipContact {
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;
-  Follow if_held_;  // how the tissue follows if the tip holds it; where that was asked for in this frame
+  double held_friction_ = 0;  // what the grasp of the last frame would take from a push
+  Follow if_held_;            // how the tissue follows if the tip holds it; where that was asked for in this frame
 };
 
 }  // namespace palpate

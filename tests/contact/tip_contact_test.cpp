@@ -126,7 +126,7 @@ TEST(TipContact, APressThatLiftsNeverPulls) {
   for (const Grip told : {Grip::automatic, Grip::push}) {
     Scene scene(Grip::push, told);
     State last = State::touching;
-    for (int i = 0; i <= 40; ++i) {
+    for (int i = 0; i <= 45; ++i) {
       const double depth_mm = i < 20 ? 0.1 * i : 2 - 0.15 * (i - 20);
       if (last == State::over) break;
       const TipContact::Answer answer = scene.move({0, 0, depth_mm});
@@ -182,13 +182,34 @@ TEST(TipContact, JawsThatStillCloseAreNoPull) {
   }
 }
 
-TEST(TipContact, FrictionToldTooLowIsCorrectedByWhatHolds) {
-  Scene scene(Grip::push, Grip::automatic, 10);
+TEST(TipContact, FrictionToldTooLowIsMadeUpForByWhatIsSeen) {
+  constexpr double kTrueFriction = 0.6;
+  Scene scene(Grip::push, Grip::automatic, kTrueFriction);
+  double peak_N = 0, error_at_the_end_N = 0;
   for (const Vec3& p : press_drag_lift(0)) {
-    if (p.x() > 3) break;
-    scene.move(p);
+    const TipContact::Answer answer = scene.move(p);
+    if (p.z() < 2) continue;
+    ASSERT_EQ(answer.state, State::touching) << p.transpose();
+    peak_N = std::max(peak_N, scene.true_force_N().norm());
+    error_at_the_end_N = (answer.equilibrium.force_N - scene.true_force_N()).norm();
   }
-  EXPECT_EQ(scene.contact().grip(), Grip::grasp) << "it holds as one";
+  EXPECT_EQ(scene.contact().grip(), Grip::push);
+  EXPECT_LT(error_at_the_end_N, 0.1 * peak_N);
+}
+
+TEST(TipContact, ATipThatPressesFirstAndThenPullsIsFoundToHold) {
+  Scene scene(Grip::grasp);
+  int frames_without_force = 0;
+  for (int i = 0; i <= 40; ++i) {
+    const TipContact::Answer answer = scene.move({0, 0, i <= 10 ? 0.2 * i : 2 - 0.2 * (i - 10)});
+    ASSERT_NE(answer.state, State::over) << i;
+    frames_without_force += answer.state != State::touching;
+    if (i > 28) {
+      EXPECT_LT((answer.equilibrium.force_N - scene.true_force_N()).norm(), 0.01) << i;
+    }
+  }
+  EXPECT_EQ(scene.contact().grip(), Grip::grasp);
+  EXPECT_LE(frames_without_force, 6);
 }
 
 }  // namespace
