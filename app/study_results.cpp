@@ -59,12 +59,17 @@ Json read_json(const std::filesystem::path& file) {
   return json.is_discarded() ? Json() : json;
 }
 
-/// Where there is no truth, what the frames were; elsewhere onset, release and false contact say it.
+/// What the frames were, where there is no truth or some claim less than a force or its absence; elsewhere onset,
+/// release and false contact say it.
 Json statuses_of(const Json& result) {
-  if (result.contains("comparison") || !result.contains("frames_by_status")) return {};
+  if (!result.contains("frames_by_status")) return {};
+  const Json& frames = result["frames_by_status"];
+  const bool all_told =
+      !frames.contains("map_stale") && !frames.contains("not_converged") && !frames.contains("tool_lost");
+  if (result.contains("comparison") && all_told) return {};
   std::string text;
-  for (const auto& [status, frames] : result["frames_by_status"].items())
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", frames.get<int>(), status);
+  for (const auto& [status, count] : result["frames_by_status"].items())
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count.get<int>(), status);
   return text;
 }
 
@@ -80,6 +85,9 @@ Json figures_of(const Json& result, const std::filesystem::path& place) {
   }
   if (map.contains("coverage")) figures["coverage_pct"] = 100 * map["coverage"].get<double>();
   figures["statuses"] = statuses_of(result);
+  // Without an instrument there is no force to tell.
+  if (comparison.empty() && figures["peak_force_N"] == 0.0)
+    figures["peak_force_N"] = figures["peak_force_per_modulus_N_per_kPa"] = Json();
   return figures;
 }
 

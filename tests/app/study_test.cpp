@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 
 #include "tests/app/program.h"
@@ -45,6 +47,14 @@ int lines_with(const std::string& text, const std::string& part) {
   int count = 0;
   for (std::string line; std::getline(stream, line);) count += line.find(part) != std::string::npos;
   return count;
+}
+
+/// Every text that the pattern's first group finds.
+std::vector<std::string> found_in(const std::string& text, const std::string& pattern) {
+  const std::regex expression(pattern);
+  std::vector<std::string> found;
+  for (std::sregex_iterator at(text.begin(), text.end(), expression), end; at != end; ++at) found.push_back((*at)[1]);
+  return found;
 }
 
 class Study : public testing::Test {
@@ -100,6 +110,63 @@ TEST_F(Study, GoesOnWhereItStopped) {
   replace_in_file(workspace / "study.yaml", "goals: {force_nrmse_pct: 25}", "estimate: {map.elements: 700}");
   ASSERT_EQ(study("--only plain").exit_code, 0);
   EXPECT_NE(std::filesystem::last_write_time(workspace / "out/runs/plain/run/result.json"), made);
+}
+
+TEST_F(Study, WritesItsFiguresAsStillPictures) {
+  ASSERT_EQ(study("--only modulus --jobs 2").exit_code, 0);
+  const std::string page = read_file(workspace / "out/results.md");
+  EXPECT_THAT(page, HasSubstr("to the power 1.000"));
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
+  const auto pictures = found_in(page, "\\]\\((figures/[^)]*)\\)");
+  ASSERT_EQ(pictures.size(), 2U);
+  const std::string chart = read_file(workspace / ("out/" + pictures[0]));
+  EXPECT_THAT(chart, HasSubstr("tissue.young_modulus_kPa (kPa)"));
+  EXPECT_THAT(chart, HasSubstr("peak force (N)"));
+}
+
+TEST_F(Study, TheSlopeOfAForceThatIsProportionalIsItsGainPerUnit) {
+  replace_in_file(workspace / "study.yaml", "logarithmic: true, times: {from: 1, to: 100, steps: 3}",
+                  "uncertainty: 2, values: [8, 10, 12]");
+  ASSERT_EQ(study("--only modulus --jobs 2").exit_code, 0);
+  const double per_kPa = 10 * result("modulus/10")["comparison"]["gain"].get<double>();
+  const std::string page = read_file(workspace / "out/results.md");
+  const auto slope = found_in(page, "Slope: \\+([0-9.]+) ± 0.00 % of the true force per kPa");
+  ASSERT_EQ(slope.size(), 1U);
+  EXPECT_NEAR(std::stod(slope[0]), per_kPa, 0.01);
+  const auto ranked = found_in(page, "\\| modulus \\| 2 kPa \\| \\+([0-9.]+) % \\|");
+  ASSERT_EQ(ranked.size(), 1U);
+  EXPECT_NEAR(std::stod(ranked[0]), 2 * per_kPa, 0.1);
+}
+
+TEST_F(Study, LeavesOutRealRecordingsThatAreNotHere) {
+  write_file(workspace / "real.yaml",
+             "recording: {left: \"${PALPATE_NO_SUCH_DATA}/l.png\", right: \"${PALPATE_NO_SUCH_DATA}/r.png\"}");
+  write_file(workspace / "study.yaml", "title: Real\nexperiments: [{name: real, scene: [real.yaml]}]\n");
+  const Outcome outcome = study("--json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["skipped"], 1);
+  EXPECT_THAT(read_file(workspace / "out/results.md"),
+              HasSubstr("| real | skipped: the data is not here: PALPATE_NO_SUCH_DATA is not set |"));
+}
+
+TEST_F(Study, TheQuickFormKeepsValuesAsTheyAre) {
+  replace_in_file(workspace / "study.yaml", "times: {from: 1, to: 100, steps: 3}", "values: [1, 2, 3, 4, 5, 6]");
+  replace_in_file(workspace / "study.yaml", "quick: 2", "quick: 3");
+  const std::string commands = study("--list-runs --quick --only modulus").output;
+  EXPECT_EQ(found_in(commands, "--run modulus/(\\d)"), (std::vector<std::string>{"1", "3", "6"}));
+  ASSERT_EQ(study("--quick --only modulus/3").exit_code, 0);
+  EXPECT_EQ(result("modulus/3")["tissue"]["young_modulus_kPa"], 3);
+}
+
+TEST(StudyOfThePaper, ItsPageNamesEveryExperimentAndHasItsPictures) {
+  const std::filesystem::path root = PALPATE_SOURCE_DIR;
+  const std::string page = read_file(root / "docs/results.md");
+  const auto names = found_in(read_file(root / "studies/paper.yaml"), "- name: (\\w+)\n");
+  ASSERT_GT(names.size(), 10U);
+  for (const std::string& name : names) EXPECT_THAT(page, HasSubstr("\n`" + name + "`"));
+  const auto pictures = found_in(page, "\\]\\(([^)]*)\\)");
+  ASSERT_GT(pictures.size(), 10U);
+  for (const std::string& picture : pictures) EXPECT_TRUE(std::filesystem::exists(root / "docs" / picture)) << picture;
 }
 
 TEST_F(Study, SaysWhatIsWrongWithItsFile) {
