@@ -77,7 +77,7 @@ ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const Segmen
   cv::Mat grey;
   cv::cvtColor(part, grey, cv::COLOR_BGR2GRAY);
   grey.convertTo(layers.brightness[0], CV_32F);
-  metalness(part, model).convertTo(layers.metal[0], CV_32F);
+  metalness(bgr, layers.region, model).convertTo(layers.metal[0], CV_32F);
   cv::GaussianBlur(layers.brightness[0], layers.brightness[0], {5, 5}, 0.9);
   cv::GaussianBlur(layers.metal[0], layers.metal[0], {7, 7}, 1.3);
   for (size_t level = 1; level < ImageLayers::kLevels; ++level) {

@@ -13,6 +13,19 @@ namespace {
 constexpr int kColourNoise = 2;       // grey levels by which a grey pixel may look red
 constexpr int kUnchanged = 24;        // grey levels between two pictures of the same still highlight
 constexpr int kNearSaturation = 200;  // both brighter than this: a highlight that flickers
+constexpr int kTissueMoves = 7;       // px at half size, twice the way and one
+constexpr int kNearby = 15;           // px at half size
+constexpr int kOtherRedness = 13;     // 255ths beyond what was seen nearby
+constexpr double kContinuedWidths = 4;
+constexpr double kLeastContinued_px = 3;  // at half size
+constexpr double kLeastNew = 0.2;         // share of an instrument that was not there in the static frame
+constexpr int kDarkest = 12;              // grey levels
+constexpr double kPalest = 0.08;          // redness of tissue that can still be told from metal
+constexpr double kReddest = 0.6;
+constexpr int kPlace = 8;   // px at half size over which the redness of tissue is averaged
+constexpr int kAround = 3;  // places to each side
+constexpr size_t kFewestPlaces = 4;
+constexpr double kClearlyPaler = 0.5;  // as a share of the organ's redness
 
 cv::Mat half_size(const cv::Mat& image) {
   cv::Mat half;
@@ -47,40 +60,125 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
   return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
 }
 
-/// Redness that four fifths of the tissue exceed, and the brightness below which colour is noise.
-void learn_tissue(const cv::Mat& half_bgr, const cv::Mat& half_organ, const cv::Mat& instrument,
-                  SegmentationModel& model) {
-  std::vector<float> redness, value;
-  for (int y = 0; y < half_bgr.rows; ++y)
-    for (int x = 0; x < half_bgr.cols; ++x) {
-      if (!half_organ.empty() && !half_organ.at<uchar>(y, x)) continue;
-      if (!instrument.empty() && instrument.at<uchar>(y, x)) continue;
-      const cv::Vec3b& p = half_bgr.at<cv::Vec3b>(y, x);
-      if (value_of(p) < 12) continue;
-      value.push_back(static_cast<float>(value_of(p)));
-      redness.push_back(static_cast<float>(redness_of(p)) / static_cast<float>(value_of(p)));
-    }
-  if (value.size() < 100) return;
-  model.tissue_redness = std::clamp(percentile(redness, 0.2), 0.2, 0.5);
-  model.least_value = std::clamp(0.2 * percentile(value, 0.9), 14.0, 32.0);
-}
-
-/// Grey pixels at half size, without the still grey ones of the static frame.
-cv::Mat grey_pixels(const cv::Mat& half_bgr, const SegmentationModel& model) {
-  cv::Mat mask = metalness(half_bgr, model) >= 128;
-  if (model.still_grey.empty()) return mask;
-  for (int y = 0; y < mask.rows; ++y) {
-    const cv::Vec3b* now = half_bgr.ptr<cv::Vec3b>(y);
-    const cv::Vec3b* before = model.reference_half.ptr<cv::Vec3b>(y);
-    const uchar* still = model.still_grey.ptr<uchar>(y);
-    uchar* row = mask.ptr<uchar>(y);
-    for (int x = 0; x < mask.cols; ++x) {
-      if (!row[x] || !still[x]) continue;
-      const int a = value_of(now[x]), b = value_of(before[x]);
-      if (std::abs(a - b) < kUnchanged || std::min(a, b) > kNearSaturation) row[x] = 0;
+/// How much pixels look like metal beside tissue of the given redness; see metalness.
+cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, double least_value) {
+  cv::Mat result(bgr.size(), CV_8U);
+  std::array<float, 256> full, per_redness, per_tissue;  // by brightness, by brightness, by redness of the tissue
+  for (int i = 0; i < 256; ++i) {
+    const double bright = std::clamp(2 * i / least_value - 1, 0.0, 1.0);
+    const size_t at = static_cast<size_t>(i);
+    full[at] = static_cast<float>(255 * bright);
+    per_redness[at] = static_cast<float>(255 * bright / std::max(i, 1));
+    per_tissue[at] = 255.0f / static_cast<float>(std::max(i, 1));
+  }
+  for (int y = 0; y < bgr.rows; ++y) {
+    const cv::Vec3b* from = bgr.ptr<cv::Vec3b>(y);
+    const uchar* tissue = tissue_redness.ptr<uchar>(y);
+    uchar* to = result.ptr<uchar>(y);
+    for (int x = 0; x < bgr.cols; ++x) {
+      const size_t value = static_cast<size_t>(value_of(from[x]));
+      const float redness = static_cast<float>(redness_of(from[x]));
+      to[x] = static_cast<uchar>(std::max(0.0f, full[value] - per_redness[value] * per_tissue[tissue[x]] * redness));
     }
   }
-  return mask;
+  return result;
+}
+
+/// What static tissue looks like: pixels at half size that are neither instrument, highlight, nor dark.
+struct StaticTissue {
+  const cv::Mat& half_bgr;
+  cv::Mat half_organ;  ///< 255 = surely tissue; may be empty
+  cv::Mat instrument;  ///< 255 = not tissue; may be empty
+
+  bool shows(int y, int x) const { return instrument.empty() || !instrument.at<uchar>(y, x); }
+  bool is_organ(int y, int x) const { return half_organ.empty() || half_organ.at<uchar>(y, x); }
+  const cv::Vec3b& at(int y, int x) const { return half_bgr.at<cv::Vec3b>(y, x); }
+};
+
+float relative_redness(const cv::Vec3b& p) {
+  return static_cast<float>(redness_of(p)) / static_cast<float>(std::max(value_of(p), 1));
+}
+
+/// Redness that four fifths of the organ exceed, and the brightness below which colour is noise.
+double learn_organ(const StaticTissue& tissue, SegmentationModel& model) {
+  std::vector<float> redness, value;
+  for (int y = 0; y < tissue.half_bgr.rows; ++y)
+    for (int x = 0; x < tissue.half_bgr.cols; ++x) {
+      const cv::Vec3b& p = tissue.at(y, x);
+      if (!tissue.is_organ(y, x) || !tissue.shows(y, x) || value_of(p) < kDarkest) continue;
+      value.push_back(static_cast<float>(value_of(p)));
+      redness.push_back(relative_redness(p));
+    }
+  if (value.size() < 100) return kReddest;
+  model.least_value = std::clamp(0.2 * percentile(value, 0.9), 14.0, 32.0);
+  return percentile(redness, 0.2);
+}
+
+/// The same redness everywhere.
+void learn_redness_everywhere(const StaticTissue& tissue, SegmentationModel& model) {
+  const double redness = std::clamp(learn_organ(tissue, model), kPalest, kReddest);
+  model.tissue_redness_half = cv::Mat(model.reference_half.size(), CV_8U, cv::Scalar(255 * redness));
+  model.tissue_redness = cv::Mat(model.reference_bgr.size(), CV_8U, cv::Scalar(255 * redness));
+}
+
+/// The redness that four fifths of the tissue around each place exceed.
+void learn_redness_of_places(const StaticTissue& tissue, SegmentationModel& model) {
+  const double everywhere = std::clamp(learn_organ(tissue, model), kPalest, kReddest);
+  const int rows = tissue.half_bgr.rows / kPlace + 1, columns = tissue.half_bgr.cols / kPlace + 1;
+  cv::Mat places(rows, columns, CV_32F, cv::Scalar(-1));
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const cv::Rect box =
+          cv::Rect(column * kPlace, row * kPlace, kPlace, kPlace) & cv::Rect({}, tissue.half_bgr.size());
+      float sum = 0;
+      int count = 0;
+      for (int y = box.y; y < box.br().y; ++y)
+        for (int x = box.x; x < box.br().x; ++x) {
+          const cv::Vec3b& p = tissue.at(y, x);
+          if (!tissue.shows(y, x) || value_of(p) < model.least_value || value_of(p) > kNearSaturation) continue;
+          sum += relative_redness(p);
+          ++count;
+        }
+      if (count > kPlace * kPlace / 4) places.at<float>(row, column) = sum / static_cast<float>(count);
+    }
+  cv::Mat around(rows, columns, CV_32F);
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      std::vector<float> values;
+      for (int y = std::max(0, row - kAround); y <= std::min(rows - 1, row + kAround); ++y)
+        for (int x = std::max(0, column - kAround); x <= std::min(columns - 1, column + kAround); ++x)
+          if (places.at<float>(y, x) >= 0) values.push_back(places.at<float>(y, x));
+      double redness = values.size() < kFewestPlaces ? everywhere : percentile(values, 0.2);
+      if (redness > kClearlyPaler * everywhere) redness = everywhere;
+      around.at<float>(row, column) = static_cast<float>(255 * std::max(redness, kPalest));
+    }
+  cv::Mat large;
+  cv::resize(around, large, {columns * kPlace, rows * kPlace}, 0, 0, cv::INTER_LINEAR);
+  large(cv::Rect({}, tissue.half_bgr.size())).convertTo(model.tissue_redness_half, CV_8U);
+  cv::resize(model.tissue_redness_half, model.tissue_redness, model.reference_bgr.size(), 0, 0, cv::INTER_LINEAR);
+}
+
+cv::Mat grey_pixels(const cv::Mat& half_bgr, const SegmentationModel& model) {
+  return metalness_beside(half_bgr, model.tissue_redness_half, model.least_value) >= 128;
+}
+
+/// Those of the grey pixels that look like what is still there since the static frame.
+cv::Mat still_pixels(const cv::Mat& grey, const cv::Mat& half_bgr, const SegmentationModel& model) {
+  cv::Mat still = cv::Mat::zeros(grey.size(), CV_8U);
+  for (int y = 0; y < grey.rows; ++y) {
+    const cv::Vec3b* now = half_bgr.ptr<cv::Vec3b>(y);
+    const uchar* is_grey = grey.ptr<uchar>(y);
+    const uchar* darkest = model.still_darkest.ptr<uchar>(y);
+    const uchar* brightest = model.still_brightest.ptr<uchar>(y);
+    uchar* row = still.ptr<uchar>(y);
+    for (int x = 0; x < grey.cols; ++x) {
+      if (!is_grey[x] || darkest[x] > brightest[x]) continue;
+      const int value = value_of(now[x]);
+      const bool flickers = std::min<int>(value, brightest[x]) > kNearSaturation;
+      if (flickers || (value > darkest[x] - kUnchanged && value < brightest[x] + kUnchanged)) row[x] = 255;
+    }
+  }
+  return still;
 }
 
 /// The part of the mask that hangs together with the border of the picture, with a margin. A highlight never does; an
@@ -120,6 +218,30 @@ cv::Mat instrument_blobs(const cv::Mat& grey, const cv::Mat& half_picture_area) 
   return result;
 }
 
+/// What is grey in the static frame and no instrument.
+void learn_still(const cv::Mat& grey, const cv::Mat& instrument, const cv::Mat& half_area, SegmentationModel& model) {
+  cv::Mat around_instrument;
+  cv::dilate(instrument, around_instrument, cv::Mat::ones(5, 5, CV_8U));
+  const cv::Mat still = grey & ~around_instrument;
+  model.still_darkest = cv::Mat(grey.size(), CV_8U, cv::Scalar(255));
+  model.still_brightest = cv::Mat::zeros(grey.size(), CV_8U);
+  for (int y = 0; y < grey.rows; ++y)
+    for (int x = 0; x < grey.cols; ++x)
+      if (still.at<uchar>(y, x))
+        model.still_darkest.at<uchar>(y, x) = model.still_brightest.at<uchar>(y, x) =
+            static_cast<uchar>(value_of(model.reference_half.at<cv::Vec3b>(y, x)));
+  const cv::Mat at_border = from_border(grey, half_area);
+  // Tissue moves a little; a highlight that does is new each time.
+  cv::Mat nearby;
+  cv::dilate(still & at_border, nearby, cv::Mat::ones(kTissueMoves, kTissueMoves, CV_8U));
+  cv::Mat darkest, brightest;
+  cv::erode(model.still_darkest, darkest, cv::Mat::ones(kTissueMoves, kTissueMoves, CV_8U));
+  cv::dilate(model.still_brightest, brightest, cv::Mat::ones(kTissueMoves, kTissueMoves, CV_8U));
+  darkest.copyTo(model.still_darkest, nearby);
+  brightest.copyTo(model.still_brightest, nearby);
+  model.still_at_border = nearby;
+}
+
 cv::Mat half_mask(const cv::Mat& mask) {
   cv::Mat half;
   if (!mask.empty())
@@ -127,8 +249,77 @@ cv::Mat half_mask(const cv::Mat& mask) {
   return half;
 }
 
-/// The outline at full resolution: metal within a pixel or two of the coarse mask, holes closed.
-cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const SegmentationModel& model) {
+cv::Mat redness_image(const cv::Mat& bgr) {
+  cv::Mat result(bgr.size(), CV_8U);
+  for (int y = 0; y < bgr.rows; ++y)
+    for (int x = 0; x < bgr.cols; ++x)
+      result.at<uchar>(y, x) = static_cast<uchar>(255 * relative_redness(bgr.at<cv::Vec3b>(y, x)));
+  return result;
+}
+
+/// Wrist and jaws that reflect the tissue's red have lost what tells metal from tissue; but where the shaft points, the
+/// picture has another redness than anything the static frame showed nearby. Returns those pixels that continue the
+/// instruments of a mask, half size.
+cv::Mat continued(const cv::Mat& half_bgr, const cv::Mat& grey, const cv::Mat& mask, const SegmentationModel& model) {
+  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
+  for (const ImageInstrument& instrument : find_instruments(mask, half_mask(model.picture_area))) {
+    const ImageTip& tip = instrument.tip;
+    const cv::Point2d side = 0.6 * tip.width_px * cv::Point2d(-tip.axis.y, tip.axis.x);
+    const cv::Point2d back = tip.tip_px - tip.width_px * tip.axis;
+    const cv::Point2d ahead = tip.tip_px + kContinuedWidths * tip.width_px * tip.axis;
+    const std::vector<cv::Point> corners = {back + side, ahead + side, ahead - side, back - side};
+    const cv::Rect box = cv::boundingRect(corners) & cv::Rect({}, mask.size());
+    if (box.area() == 0) continue;
+    cv::Mat strip = cv::Mat::zeros(box.size(), CV_8U);
+    std::vector<cv::Point> moved;
+    for (const cv::Point& corner : corners) moved.push_back(corner - box.tl());
+    cv::fillConvexPoly(strip, moved, 255);
+
+    cv::Mat own = cv::Mat::zeros(mask.size(), CV_8U), others;
+    instrument.mask.copyTo(own(instrument.box));
+    own = own(box);
+    cv::dilate(mask(box) & ~own, others, cv::Mat::ones(7, 7, CV_8U));  // it must not grow into another one
+    strip &= ~others;
+
+    cv::Mat part;
+    cv::blur(half_bgr(box), part, {3, 3});
+    const cv::Mat redness = redness_image(part);
+    cv::Mat joined = cv::Mat::zeros(box.size(), CV_8U);
+    for (int y = 0; y < box.height; ++y)
+      for (int x = 0; x < box.width; ++x) {
+        const int value = value_of(part.at<cv::Vec3b>(y, x)), now = redness.at<uchar>(y, x);
+        if (!strip.at<uchar>(y, x) || value < model.least_value || value > kNearSaturation) continue;
+        const int least = model.least_redness_half(box).at<uchar>(y, x),
+                  most = model.most_redness_half(box).at<uchar>(y, x);
+        if (now < least - kOtherRedness || now > most + kOtherRedness) joined.at<uchar>(y, x) = 255;
+      }
+    joined |= strip & (grey(box) | own);
+    cv::morphologyEx(joined, joined, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+    cv::morphologyEx(joined, joined, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
+    cv::Mat labels;
+    const int count = cv::connectedComponents(joined, labels, 8);
+    std::vector<uchar> hangs_on(static_cast<size_t>(count), 0);
+    for (int y = 0; y < box.height; ++y)
+      for (int x = 0; x < box.width; ++x)
+        if (own.at<uchar>(y, x)) hangs_on[static_cast<size_t>(labels.at<int>(y, x))] = 255;
+    hangs_on[0] = 0;
+    cv::Mat further = cv::Mat::zeros(box.size(), CV_8U);
+    double farthest = 0;
+    for (int y = 0; y < box.height; ++y)
+      for (int x = 0; x < box.width; ++x) {
+        if (!hangs_on[static_cast<size_t>(labels.at<int>(y, x))] || mask(box).at<uchar>(y, x) || others.at<uchar>(y, x))
+          continue;
+        further.at<uchar>(y, x) = 255;
+        farthest = std::max(farthest, (cv::Point2d(x + box.x, y + box.y) - tip.tip_px).dot(tip.axis));
+      }
+    // Less than that is the blurred edge of what was found.
+    if (farthest > kLeastContinued_px) result(box) |= further;
+  }
+  return result;
+}
+
+/// The outline at full resolution: metal within a pixel or two of the coarse mask, holes closed. `sure` needs no metal.
+cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const cv::Mat& sure, const SegmentationModel& model) {
   cv::Mat mask = cv::Mat::zeros(bgr.size(), CV_8U);
   cv::Rect box = cv::boundingRect(coarse);
   if (box.area() == 0) return mask;
@@ -137,9 +328,13 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const SegmentationMode
   cv::resize(coarse, upsampled, bgr.size(), 0, 0, cv::INTER_NEAREST);
   cv::dilate(upsampled(box), near, cv::Mat::ones(5, 5, CV_8U));
   cv::erode(upsampled(box), core, cv::Mat::ones(7, 7, CV_8U));
-  cv::Mat fine = metalness(bgr(box), model);
+  cv::Mat fine = metalness(bgr, box, model);
   cv::medianBlur(fine, fine, 3);
   fine = ((fine >= 128) & near) | core;
+  if (!sure.empty()) {
+    cv::resize(sure, upsampled, bgr.size(), 0, 0, cv::INTER_NEAREST);
+    fine |= upsampled(box);
+  }
   cv::morphologyEx(fine, fine, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(fine, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
@@ -151,25 +346,8 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const SegmentationMode
 
 }  // namespace
 
-cv::Mat metalness(const cv::Mat& bgr, const SegmentationModel& model) {
-  cv::Mat result(bgr.size(), CV_8U);
-  std::array<float, 256> full, per_redness;  // by brightness
-  for (int value = 0; value < 256; ++value) {
-    const double bright = std::clamp(2 * value / model.least_value - 1, 0.0, 1.0);
-    full[static_cast<size_t>(value)] = static_cast<float>(255 * bright);
-    per_redness[static_cast<size_t>(value)] =
-        static_cast<float>(255 * bright / (model.tissue_redness * std::max(value, 1)));
-  }
-  for (int y = 0; y < bgr.rows; ++y) {
-    const cv::Vec3b* from = bgr.ptr<cv::Vec3b>(y);
-    uchar* to = result.ptr<uchar>(y);
-    for (int x = 0; x < bgr.cols; ++x) {
-      const size_t value = static_cast<size_t>(value_of(from[x]));
-      const float redness = static_cast<float>(redness_of(from[x]));
-      to[x] = static_cast<uchar>(std::max(0.0f, full[value] - per_redness[value] * redness));
-    }
-  }
-  return result;
+cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model) {
+  return metalness_beside(bgr(part), model.tissue_redness(part), model.least_value);
 }
 
 SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& organ_mask) {
@@ -180,21 +358,39 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
   const cv::Mat half_organ = half_mask(organ_mask);
   const cv::Mat half_area = half_mask(model.picture_area);
 
-  // Twice, because an instrument inside the organ region would be learnt as pale tissue the first time.
-  learn_tissue(model.reference_half, half_organ, {}, model);
+  // Several times, because an instrument inside the organ region would be learnt as pale tissue the first time.
+  learn_redness_everywhere({model.reference_half, half_organ, {}}, model);
   cv::Mat coarse = instrument_blobs(grey_pixels(model.reference_half, model), half_area);
-  learn_tissue(model.reference_half, half_organ, coarse, model);
-  const cv::Mat grey = grey_pixels(model.reference_half, model);
+  learn_redness_everywhere({model.reference_half, half_organ, coarse}, model);
+  cv::Mat grey = grey_pixels(model.reference_half, model);
+  cv::Mat perhaps_instrument = instrument_blobs(grey, half_area) | from_border(grey, half_area);
+  cv::dilate(perhaps_instrument, perhaps_instrument, cv::Mat::ones(5, 5, CV_8U));
+  learn_redness_of_places({model.reference_half, half_organ, perhaps_instrument}, model);
+  grey = grey_pixels(model.reference_half, model);
   coarse = instrument_blobs(grey, half_area);
 
-  model.reference_mask = refine(static_bgr, coarse, model);
-  model.still_grey = grey & ~from_border(grey, half_area);
+  model.reference_mask = refine(static_bgr, coarse, {}, model);
+  learn_still(grey, coarse, half_area, model);
+  cv::Mat smooth;
+  cv::blur(model.reference_half, smooth, {3, 3});
+  const cv::Mat redness = redness_image(smooth), nearby = cv::Mat::ones(kNearby, kNearby, CV_8U);
+  cv::erode(redness, model.least_redness_half, nearby);
+  cv::dilate(redness, model.most_redness_half, nearby);
   return model;
 }
 
 cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model) {
-  const cv::Mat coarse = instrument_blobs(grey_pixels(half_size(bgr), model), half_mask(model.picture_area));
-  return refine(bgr, coarse, model);
+  const cv::Mat half = half_size(bgr), half_area = half_mask(model.picture_area);
+  const cv::Mat grey = grey_pixels(half, model), still = still_pixels(grey, half, model);
+  cv::Mat coarse = instrument_blobs(grey & ~still, half_area);
+  // An instrument that stood at the border in the static frame, too short to be recognised, hangs on what is still.
+  if (cv::countNonZero(coarse) == 0) {
+    coarse = instrument_blobs(grey & ~(still & ~model.still_at_border), half_area);
+    if (cv::countNonZero(coarse & ~still) < kLeastNew * cv::countNonZero(coarse)) coarse.setTo(0);
+  }
+  if (cv::countNonZero(coarse) == 0) return cv::Mat::zeros(bgr.size(), CV_8U);
+  const cv::Mat further = continued(half, grey & ~still, coarse, model);
+  return refine(bgr, coarse | further, further, model);
 }
 
 }  // namespace palpate

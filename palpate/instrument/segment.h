@@ -10,10 +10,17 @@ struct SegmentationModel {
   cv::Mat reference_bgr;   ///< rectified image of the static frame, same eye as the images to segment
   cv::Mat reference_mask;  ///< 255 where the static frame already shows an instrument
   cv::Mat picture_area;    ///< 255 inside the picture, 0 in the black surround of scope or rectification
-  cv::Mat still_grey;      ///< 255 where the static frame is grey without an instrument (highlights, fat); half size
   cv::Mat reference_half;  ///< the static frame at half size
-  double tissue_redness = 0.5;  ///< redness (see metalness) that most of the organ exceeds
-  double least_value = 24;      ///< darker pixels have no colour to judge, grey levels
+  /// Where the static frame is grey without an instrument (highlights, tendon): how dark and how bright such pixels are
+  /// nearby, 255 and 0 where there are none; half size.
+  cv::Mat still_darkest, still_brightest;
+  cv::Mat still_at_border;  ///< 255 where that hangs together with the border and might be an instrument; half size
+  /// Redness (see metalness) that most of the tissue around exceeds, in 255ths: pale tissue is told from metal by less
+  /// colour than red tissue is. Of the whole image, and at half size.
+  cv::Mat tissue_redness, tissue_redness_half;
+  /// Least and greatest redness of the static frame within a few pixels, in 255ths; half size.
+  cv::Mat least_redness_half, most_redness_half;
+  double least_value = 24;  ///< darker pixels have no colour to judge, grey levels
 };
 
 /// Learns what is tissue from a static frame of one eye. `organ_mask` (255 = surely tissue; may be empty) narrows it.
@@ -23,8 +30,8 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
 /// highlights of the tissue left out, small holes closed, blobs that do not look like an instrument dropped.
 cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model);
 
-/// How much each pixel looks like metal, 8-bit: 255 = without any redness (r - min(g, b)) / max(r, g, b), 128 = half
-/// the redness of tissue, 0 = as red as tissue or too dark to tell.
-cv::Mat metalness(const cv::Mat& bgr, const SegmentationModel& model);
+/// How much each pixel of a part of the image looks like metal, 8-bit: 255 = without any redness
+/// (r - min(g, b)) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to tell.
+cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model);
 
 }  // namespace palpate
