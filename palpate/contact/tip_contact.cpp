@@ -1,6 +1,7 @@
 #include "palpate/contact/tip_contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace palpate {
@@ -13,6 +14,12 @@ constexpr int kPressedFrames = 2;
 /// A lifted tip that comes so deep again presses again; one so far above the surface has left it, unless it may still
 /// turn out to take the tissue along.
 constexpr double kPressesAgain_mm = 0.2;
+/// A tip that goes back by so much from one frame to the next lifts where it is nearly back at the surface, or where
+/// the tissue is seen to have come to rest: the share of the predicted motion, and one standard deviation more.
+constexpr double kLiftStep_mm = 0.08, kNearlyBack_mm = 0.15, kRestingShare = 0.3;
+/// Of a tracked point across the viewing ray, mm; so many neighbours share their errors.
+constexpr double kPointDeviation_mm = 0.05;
+constexpr double kPointsThatAgree = 6;
 constexpr double kAway_mm = 0.6, kAwayUntold_mm = 1.5;
 constexpr int kFewestFollowingPoints = 6;
 /// A tip that has come to rest does not go on like this in the first frames of a contact without the tissue.
@@ -74,8 +81,16 @@ bool TipContact::has_pressed() const {
   return pressed_frames_ >= kPressedFrames;
 }
 
-TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, double height_mm) {
-  if (!answer.let_go && !(lifted_ && height_mm > -kPressesAgain_mm)) {
+bool TipContact::lifts(const Follow& follow, double height_mm) const {
+  if (!has_pressed() || height_mm - last_height_mm_ < kLiftStep_mm) return false;
+  if (height_mm > -kNearlyBack_mm) return true;
+  const double all_mm = std::sqrt(follow.points / kPointsThatAgree) * follow.predicted_mm;
+  return follow.points >= kFewestFollowingPoints && follow.share + kPointDeviation_mm / all_mm < kRestingShare;
+}
+
+TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm) {
+  const bool stays_lifted = lifted_ && height_mm > -kPressesAgain_mm;
+  if (!answer.let_go && !stays_lifted && !lifts(follow, height_mm)) {
     lifted_ = false;
     return State::touching;
   }
@@ -128,10 +143,11 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   }
   held_friction_ = friction_of(believed.answer);
   if (pushes_) {
-    result.state = state_of_push(believed.answer, height_mm);
+    result.state = state_of_push(believed.answer, follow, height_mm);
   } else {
     lifted_ = false;
   }
+  last_height_mm_ = height_mm;
   if (let_go) result.state = State::over;
   if (unsettled) result.state = State::unsettled;
   result.misfit_mm = follow.misfit_mm;

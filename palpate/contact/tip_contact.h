@@ -46,7 +46,8 @@ class TipContact {
   Believed grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
   Believed believe(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
   std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const;
-  State state_of_push(const HeldContact::Answer& answer, double height_mm);
+  State state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm);
+  bool lifts(const Follow& follow, double height_mm) const;
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
   double friction_of(const HeldContact::Answer& answer) const;
@@ -57,6 +58,7 @@ class TipContact {
   GripJudge judge_;
   ReleaseDetector release_;
   Vec3 last_displacement_mm_ = Vec3::Zero();
+  double last_height_mm_ = 0;
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;

@@ -134,12 +134,22 @@ TEST(TipContact, APressThatLiftsNeverPulls) {
       if (depth_mm < 0 && i > 20) {
         EXPECT_NE(answer.state, State::touching) << depth_mm;
       }
-      if (depth_mm > 0.05) {
+      if (depth_mm > 0.2 || (i < 20 && depth_mm > 0.05)) {
         EXPECT_EQ(answer.state, State::touching) << depth_mm;
         EXPECT_NEAR(answer.equilibrium.force_N.z(), scene.true_force_N().z(), 0.02) << depth_mm;
       }
     }
     EXPECT_EQ(last, State::over);
+  }
+}
+
+TEST(TipContact, ATipThatLiftsIsOffTheTissueOnceThatIsSeenAtRestHoweverDeepTheTipIsThoughtToBe) {
+  for (const Grip told : {Grip::automatic, Grip::push}) {
+    Scene scene(Grip::push, told);
+    for (int i = 0; i <= 20; ++i) scene.move({0.04 * i, 0, 0.1 * i});
+    for (int i = 1; i <= 5; ++i) EXPECT_EQ(scene.move({0.8, 0, 2 - 0.25 * i}).state, State::touching) << i;
+    EXPECT_EQ(scene.move_alone({0.8, 0, 0.6}).state, State::lifted);
+    EXPECT_EQ(scene.move({0.8, 0, 1.2}).state, State::touching) << "presses again";
   }
 }
 
