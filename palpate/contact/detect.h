@@ -9,6 +9,8 @@ struct Gap {
   double distance_mm = 0;  ///< along the outward normal: positive outside, negative inside
   Vec3 surface_point_mm = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();  ///< outward
+  int triangle = -1;            ///< of the boundary
+  Vec3 barycentric = Vec3::Zero();
 };
 
 /// `nodes_mm`: deformed nodes; `boundary`: outward triangles. Throws std::invalid_argument without triangles.

@@ -28,7 +28,9 @@ struct HeldContact::State {
 
   const Footprint& footprint() const { return body->footprint(number); }
 
-  Answer grasp(const Vec3& displacement_mm) { return {body->solve(number, displacement_mm), false, false}; }
+  Answer grasp(const Vec3& displacement_mm) {
+    return {body->solve(number, displacement_mm), false, false, displacement_mm};
+  }
 
   /// Tangential part of a force beyond Coulomb's cone, as a share of the whole; 0 within the cone.
   double share_beyond_cone(const Vec3& force_N) const {
@@ -40,7 +42,7 @@ struct HeldContact::State {
 
   Vec3 tangential(const Vec3& v) const { return v - v.dot(footprint().normal) * footprint().normal; }
 
-  Answer apart() { return {body->solve_without(number), true, false}; }
+  Answer apart() { return {body->solve_without(number), true, false, Vec3::Zero()}; }
 
   Answer push(const Vec3& displacement_mm, const Answer* tied) {
     const Vec3 tip_mm = footprint().center_mm + displacement_mm;

@@ -20,8 +20,9 @@ class HeldContact {
 
   struct Answer {
     Equilibrium equilibrium;
-    bool let_go = false;  ///< a push whose tip is off the tissue
-    bool slid = false;    ///< a push at the edge of its friction cone
+    bool let_go = false;          ///< a push whose tip is off the tissue
+    bool slid = false;            ///< a push at the edge of its friction cone
+    Vec3 tied_mm = Vec3::Zero();  ///< displacement that the footprint has in this equilibrium
   };
 
   /// The tissue goes where the tip goes.

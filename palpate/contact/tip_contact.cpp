@@ -40,10 +40,23 @@ TipContact::TipContact(HeldContact held, Grip grip)
   release_.start();
 }
 
-std::vector<Vec3> TipContact::predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const {
+std::vector<Vec3> TipContact::predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) {
+  const auto displacement = [&](const std::vector<Vec3>& rest_mm) {
+    return displacement_at(held_.body().model(), held_.body().boundary(), answer.equilibrium.u, rest_mm);
+  };
   std::vector<Vec3> rest;
   for (const TissuePoint& point : seen) rest.push_back(point.rest_mm);
-  return displacement_at(held_.body().model(), held_.body().boundary(), answer.equilibrium.u, rest);
+  if (held_.displaced_at_begin_mm().isZero()) return displacement(rest);
+
+  // Where another tip had moved the tissue when this one touched, points were first seen off their rest.
+  const std::vector<Vec3> moved = displacement(rest);
+  for (size_t i = 0; i < seen.size(); ++i) {
+    const Vec3 before_mm = moved[i] - seen[i].displacement_mm;
+    rest[i] = origins_.try_emplace(seen[i].number, Origin{rest[i] - before_mm, before_mm}).first->second.rest_mm;
+  }
+  std::vector<Vec3> motion = displacement(rest);
+  for (size_t i = 0; i < seen.size(); ++i) motion[i] -= origins_.at(seen[i].number).displacement_mm;
+  return motion;
 }
 
 TipContact::Believed TipContact::grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen) {
@@ -152,6 +165,7 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   if (unsettled) result.state = State::unsettled;
   result.misfit_mm = follow.misfit_mm;
   result.slid = believed.answer.slid;
+  result.tied_mm = believed.answer.tied_mm;
   result.equilibrium = std::move(believed.answer.equilibrium);
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 
 #include "palpate/contact/follow.h"
@@ -27,6 +28,7 @@ class TipContact {
     Vec3 tip_mm = Vec3::Zero();
     double misfit_mm = 0;  ///< between the predicted and the seen motion of the tissue, median
     bool slid = false;
+    Vec3 tied_mm = Vec3::Zero();  ///< displacement that the footprint has in this equilibrium
   };
 
   /// `displacement_mm`: of the tip since onset. `seen`: the tissue around the contact, since onset.
@@ -45,15 +47,21 @@ class TipContact {
   Believed pushed(const Vec3& p_mm, const std::vector<TissuePoint>& seen, const HeldContact::Answer* tied = nullptr);
   Believed grasped(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
   Believed believe(const Vec3& p_mm, const std::vector<TissuePoint>& seen);
-  std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen) const;
+  std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen);
   State state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm);
   bool lifts(const Follow& follow, double height_mm) const;
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
   double friction_of(const HeldContact::Answer& answer) const;
 
+  /// A point of the tissue before any tip moved it, and where it was moved to before it was first seen.
+  struct Origin {
+    Vec3 rest_mm, displacement_mm;
+  };
+
   HeldContact held_;
   Vec3 touch_mm_;
+  std::map<int, Origin> origins_;  // by number of the point
   Grip asked_for_;
   GripJudge judge_;
   ReleaseDetector release_;

@@ -22,7 +22,8 @@ struct FrameTimes {
   double total_ms() const { return rectify_ms + track_ms + contact_ms + solve_ms + stress_ms + draw_ms; }
 };
 
-/// The answer to one frame; one row of forces.csv. Forces of the instrument on the tissue, left camera frame.
+/// The answer to one frame for one instrument; one row of forces.csv. Forces of the instrument on the tissue, left
+/// camera frame.
 struct ForceEstimate {
   int frame = 0;
   double time_s = 0;
@@ -36,8 +37,9 @@ struct ForceEstimate {
   double misfit_mm = 0;
   std::vector<std::string> warnings;
   FrameTimes times;
+  std::vector<ForceEstimate> further;  ///< of the further instruments (forces_2.csv), without what is drawn
 
-  /// What the overlay draws: the deformed map. Empty where nothing was computed.
+  /// What the overlay draws: the map as all instruments deform it. Empty where nothing was computed.
   std::vector<Vec3> deformed_nodes_mm;
   std::vector<Triangle> boundary;  ///< outward triangles of these nodes (finer than the map's around a contact)
   std::vector<double> node_von_mises_kPa;

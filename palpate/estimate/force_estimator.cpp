@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 
 #include "palpate/contact/detect.h"
 #include "palpate/contact/map_watch.h"
@@ -52,46 +53,59 @@ std::vector<Vec3> deformed(const TetModel& model, const Eigen::VectorXd& u) {
   return nodes;
 }
 
-}  // namespace
+/// What is kept of one instrument: free, touching or lost.
+struct Hand {
+  Hand(size_t number, double threshold_mm, const Rectification& rectification)
+      : instrument(number), onset(threshold_mm), tissue_motion(rectification) {}
 
-struct ForceEstimator::State {
-  TissueMap map;
-  std::vector<Triangle> boundary;
-  Rectification rectification;
-  AttachmentOptions attachments;
-  ContactOptions options;
-  InstrumentTracker tracker;
-  MapWatch map_watch;
-  std::array<cv::Mat, 2> last_pictures;
+  size_t instrument;
   OnsetDetector onset;
   TissueMotion tissue_motion;
-  std::shared_ptr<TouchedBody> body;
   std::optional<TipContact> contact;
   Vec3 onset_tip_mm = Vec3::Zero();
   Vec3 last_tip_mm = Vec3::Zero();
   std::optional<bool> was_closed;  // jaws of the free tip, where a tip track says so
   int lost_frames = 0;             // up to this one, without a gap
   double last_seen_s = 0;
+};
+
+/// What a frame shows, and whether the map still lies where it was built.
+struct SeenFrame {
+  RectifiedPair pair;
+  InstrumentObservations instruments;
+  bool repeated = false;
+  MapWatch::Answer scene;
+};
+
+}  // namespace
+
+struct ForceEstimator::State {
+  TissueMap map;
+  Rectification rectification;
+  AttachmentOptions attachments;
+  ContactOptions options;
+  InstrumentTracker tracker;
+  MapWatch map_watch;
+  std::array<cv::Mat, 2> last_pictures;
+  std::shared_ptr<TouchedBody> body;
+  std::vector<Hand> hands;
+  // The body's surface as last computed, and the same at rest: what a free tip may touch.
+  bool is_at_rest = false;
+  std::vector<Triangle> boundary;
+  std::vector<Vec3> rest_mm, deformed_mm;
 
   State(TissueMap m, const StereoFrame& static_frame, const Rectification& r, const AttachmentOptions& a,
         const InstrumentOptions& instrument, const ContactOptions& contact_options)
       : map(std::move(m)),
-        boundary(boundary_triangles(map.mesh)),
         rectification(r),
         attachments(a),
         options(contact_options),
         tracker(instrument, rectification, rectify(rectification, static_frame), map.organ_mask),
-        map_watch(rectify(rectification, static_frame).left, {}),
-        onset(contact_options.threshold_mm),
-        tissue_motion(rectification) {
+        map_watch(rectify(rectification, static_frame).left, {}) {
     const auto around = [this](const std::vector<Vec3>& places_mm) { return mesh_around(places_mm); };
     body = std::make_shared<TouchedBody>(around, map.tissue, map.element, options.footprint_radius_mm);
-  }
-
-  bool is_repeated(const RectifiedPair& pair) {
-    std::array<cv::Mat, 2> pictures = {every_fourth_pixel(pair.left), every_fourth_pixel(pair.right)};
-    std::swap(pictures, last_pictures);
-    return same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
+    for (size_t i = 0; i < kMostInstruments; ++i) hands.emplace_back(i, options.threshold_mm, rectification);
+    come_to_rest();
   }
 
   /// The map, finer around places that are touched.
@@ -107,72 +121,151 @@ struct ForceEstimator::State {
     return attached;
   }
 
-  void begin_contact(const RectifiedPair& pair, const InstrumentObservations& seen, const Gap& gap) {
-    contact.reset();
-    contact.emplace(HeldContact(body, gap.surface_point_mm, options), options.grip);
-    onset_tip_mm = seen.tips[0].tip_mm;
-    tracker.mark(0);
-    tissue_motion.start(pair, seen.left_mask, gap.surface_point_mm,
-                        std::max(kLeastWatched_mm, kWatchedRadii * options.footprint_radius_mm));
+  void come_to_rest() {
+    if (std::exchange(is_at_rest, true)) return;
+    boundary = boundary_triangles(map.mesh);
+    rest_mm = deformed_mm = map.mesh.nodes_mm;
   }
 
-  void end_contact(const Vec3& tip_mm) {
-    contact.reset();
-    tracker.unmark(0);
-    tissue_motion.stop();
-    onset.let_go(tip_mm);
+  SeenFrame look(const StereoFrame& frame, FrameTimes& times) {
+    Stopwatch watch;
+    SeenFrame seen;
+    seen.pair = rectify(rectification, frame);
+    std::array<cv::Mat, 2> pictures = {every_fourth_pixel(seen.pair.left), every_fourth_pixel(seen.pair.right)};
+    std::swap(pictures, last_pictures);
+    seen.repeated = same_picture(pictures[0], last_pictures[0]) && same_picture(pictures[1], last_pictures[1]);
+    times.rectify_ms = watch.lap_ms();
+    seen.instruments = tracker.update(seen.pair);
+    if (frame.index > map.frame) seen.scene = map_watch.update(seen.pair.left, seen.instruments.left_mask);
+    times.track_ms = watch.lap_ms();
+    return seen;
   }
 
-  /// Where the free tip stands against the map at rest, and whether it begins to touch (Eq. 4).
-  void look_for_contact(const RectifiedPair& pair, const InstrumentObservations& seen) {
-    const TipObservation& tip = seen.tips[0];
-    const Gap gap = gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary);
+  void begin_contact(Hand& hand, const SeenFrame& seen, const Gap& gap) {
+    const Triangle& corners = boundary[static_cast<size_t>(gap.triangle)];
+    Vec3 place_mm = Vec3::Zero();
+    for (size_t c = 0; c < 3; ++c)
+      place_mm += gap.barycentric[static_cast<int>(c)] * rest_mm[static_cast<size_t>(corners[c])];
+    hand.contact.reset();
+    hand.contact.emplace(HeldContact(body, place_mm, options), options.grip);
+    hand.onset_tip_mm = seen.instruments.tips[hand.instrument].tip_mm;
+    tracker.mark(hand.instrument);
+    hand.tissue_motion.start(seen.pair, seen.instruments.left_mask, gap.surface_point_mm,
+                             std::max(kLeastWatched_mm, kWatchedRadii * options.footprint_radius_mm));
+  }
+
+  void end_contact(Hand& hand, const Vec3& tip_mm) {
+    hand.contact.reset();
+    tracker.unmark(hand.instrument);
+    hand.tissue_motion.stop();
+    hand.onset.let_go(tip_mm);
+  }
+
+  Gap gap_of(const TipObservation& tip) const { return gap_to_surface(tip.tip_mm, deformed_mm, boundary); }
+
+  /// Where the free tip stands against the surface, and whether it begins to touch (Eq. 4).
+  void look_for_contact(Hand& hand, const SeenFrame& seen) {
+    const TipObservation& tip = seen.instruments.tips[hand.instrument];
+    const Gap gap = gap_of(tip);
     const double deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
-    const bool comes_to_rest = onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
-    const bool closes = tip.closed.value_or(false) && was_closed == false && gap.distance_mm < options.threshold_mm;
-    was_closed = tip.closed;
-    if (closes || (comes_to_rest && tip.closed.value_or(true))) begin_contact(pair, seen, gap);
+    const bool comes_to_rest = hand.onset.update(gap.distance_mm, deviation_mm, tip.tip_mm);
+    const bool closes =
+        tip.closed.value_or(false) && hand.was_closed == false && gap.distance_mm < options.threshold_mm;
+    hand.was_closed = tip.closed;
+    if (closes || (comes_to_rest && tip.closed.value_or(true))) begin_contact(hand, seen, gap);
+  }
+
+  /// Whether the tip is seen and where; begins a contact when it touches, gives one up that was not seen for too long.
+  void follow_tip(Hand& hand, const SeenFrame& seen, ForceEstimate& estimate) {
+    const TipObservation& tip = seen.instruments.tips[hand.instrument];
+    if (seen.instruments.eyes_out_of_step) estimate.warnings.push_back("eyes_out_of_step");
+    if (!tip.visible || seen.scene.veiled) {
+      estimate.status = FrameStatus::tool_lost;
+      ++hand.lost_frames;
+      if (hand.contact && estimate.time_s - hand.last_seen_s > kLongestLost_s) end_contact(hand, hand.last_tip_mm);
+      if (!hand.contact) hand.onset.lose();
+      return;
+    }
+    hand.last_seen_s = estimate.time_s;
+    hand.last_tip_mm = tip.tip_mm;
+    estimate.tip_mm = tip.tip_mm;
+    // Where the map no longer lies nothing begins to touch it, and a picture that stands still says nothing about the
+    // tip.
+    if (seen.scene.map_is_stale) estimate.status = FrameStatus::map_stale;
+    const bool may_touch = !seen.scene.map_is_stale && !seen.repeated && estimate.frame > map.frame;
+    if (!hand.contact && may_touch) look_for_contact(hand, seen);
+    if (!hand.contact) hand.lost_frames = 0;
   }
 
   /// u, lambda of Eq. 3 for the tip's displacement since onset; ends the contact when the image or the grip says so.
-  std::optional<Equilibrium> solve_contact(const RectifiedPair& pair, const InstrumentObservations& instruments,
-                                           ForceEstimate& estimate) {
-    const TipObservation& tip = instruments.tips[0];
+  std::optional<TipContact::Answer> solve_contact(Hand& hand, const SeenFrame& seen, ForceEstimate& estimate) {
+    const TipObservation& tip = seen.instruments.tips[hand.instrument];
+    const bool has_to_be_seen = std::exchange(hand.lost_frames, 0) > kFlickerFrames;
     if (tip.closed && !*tip.closed) {
-      end_contact(tip.tip_mm);
-      was_closed = false;
+      end_contact(hand, tip.tip_mm);
+      hand.was_closed = false;
       return std::nullopt;
     }
-    const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - onset_tip_mm);
-    const std::vector<TissuePoint> seen = tissue_motion.update(pair, instruments.left_mask, instruments.right_mask);
-    TipContact::Answer answer = contact->update(p, seen, lost_frames > kFlickerFrames);
-    if (answer.state == TipContact::State::unsettled && onset.may_begin_again()) {
-      begin_contact(pair, instruments, gap_to_surface(tip.tip_mm, map.mesh.nodes_mm, boundary));
-      answer = contact->update(Vec3::Zero(), {});
+    const Vec3 p = tip.since_mark_mm.value_or(tip.tip_mm - hand.onset_tip_mm);
+    const std::vector<TissuePoint> tissue =
+        hand.tissue_motion.update(seen.pair, seen.instruments.left_mask, seen.instruments.right_mask);
+    TipContact::Answer answer = hand.contact->update(p, tissue, has_to_be_seen);
+    if (answer.state == TipContact::State::unsettled && hand.onset.may_begin_again()) {
+      begin_contact(hand, seen, gap_of(tip));
+      answer = hand.contact->update(Vec3::Zero(), {});
     }
     if (answer.state == TipContact::State::over || answer.state == TipContact::State::unsettled)
-      end_contact(tip.tip_mm);
+      end_contact(hand, tip.tip_mm);
     if (answer.state != TipContact::State::touching) return std::nullopt;
     estimate.tip_mm = answer.tip_mm;
     estimate.misfit_mm = answer.misfit_mm;
     if (answer.slid) estimate.warnings.push_back("sliding");
-    return std::move(answer.equilibrium);
+    return answer;
   }
 
-  void report(const Equilibrium& equilibrium, ForceEstimate& estimate) const {
+  /// The equilibrium under all tips that touch; a tip that was followed after another one has moved the tissue on.
+  Equilibrium solve_together(const std::vector<std::optional<TipContact::Answer>>& answers) {
+    Equilibrium last;
+    size_t touching = 0;
+    for (const auto& answer : answers) touching += answer.has_value();
+    for (size_t i = 0; i < hands.size(); ++i) {
+      if (!answers[i]) continue;
+      last =
+          touching == 1 ? answers[i]->equilibrium : body->solve(hands[i].contact->held().number(), answers[i]->tied_mm);
+    }
+    return last;
+  }
+
+  void report(const Hand& hand, const Equilibrium& equilibrium, bool map_is_stale, ForceEstimate& estimate) const {
+    const ContactForce& own = equilibrium.contacts[static_cast<size_t>(hand.contact->held().number())];
     estimate.in_contact = true;
     estimate.residual = equilibrium.residual;
     estimate.status = FrameStatus::not_converged;
-    if (contact->held().near_attachment()) estimate.warnings.push_back("near_attachment");
+    if (hand.contact->held().near_attachment()) estimate.warnings.push_back("near_attachment");
     if (!body->model().in_valid_range(equilibrium.u)) estimate.warnings.push_back("law_out_of_range");
     // At the rim of a pushed patch a few elements of Saint Venant-Kirchhoff turn inside out long before the force does.
     if (equilibrium.smallest_volume_ratio <= 0) estimate.warnings.push_back("inverted_elements");
     if (!equilibrium.converged) return;
-    estimate.status = estimate.misfit_mm > kStaleMisfit_mm ? FrameStatus::map_stale : FrameStatus::ok;
-    estimate.force_N = equilibrium.force_N;
-    estimate.mean_nodal_force_N = equilibrium.mean_nodal_force_N;
-    estimate.deformed_nodes_mm = deformed(body->model(), equilibrium.u);
-    estimate.boundary = body->boundary();
+    const bool stale = map_is_stale || estimate.misfit_mm > kStaleMisfit_mm;
+    estimate.status = stale ? FrameStatus::map_stale : FrameStatus::ok;
+    estimate.force_N = own.force_N;
+    estimate.mean_nodal_force_N = own.mean_nodal_force_N;
+  }
+
+  /// The deformed surface for drawing and for tips that come, and its stress.
+  void show(const Equilibrium& equilibrium, ForceEstimate& estimate) {
+    is_at_rest = false;
+    boundary = body->boundary();
+    rest_mm = body->model().rest_mm();
+    deformed_mm = deformed(body->model(), equilibrium.u);
+    estimate.boundary = boundary;
+    estimate.deformed_nodes_mm = deformed_mm;
+    estimate.node_von_mises_kPa = node_von_mises_kPa(body->model(), equilibrium.u);
+    estimate.max_von_mises_kPa =
+        *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
+    for (ForceEstimate& other : estimate.further)
+      if (other.in_contact) other.max_von_mises_kPa = estimate.max_von_mises_kPa;
+    if (!estimate.in_contact) estimate.max_von_mises_kPa = 0;
   }
 };
 
@@ -192,54 +285,31 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   ForceEstimate estimate;
   estimate.frame = frame.index;
   estimate.time_s = frame.time_s;
+  estimate.further.resize(kMostInstruments - 1, estimate);
+  const auto of = [&estimate](size_t instrument) -> ForceEstimate& {
+    return instrument == 0 ? estimate : estimate.further[instrument - 1];
+  };
+  const SeenFrame seen = s.look(frame, estimate.times);
+  estimate.left_instrument_mask = seen.instruments.left_mask;
+
   Stopwatch watch;
-
-  const RectifiedPair pair = rectify(s.rectification, frame);
-  const bool repeated = s.is_repeated(pair);
-  estimate.times.rectify_ms = watch.lap_ms();
-
-  const InstrumentObservations seen = s.tracker.update(pair);
-  const TipObservation& tip = seen.tips[0];
-  estimate.left_instrument_mask = seen.left_mask;
-  if (seen.eyes_out_of_step) estimate.warnings.push_back("eyes_out_of_step");
-  MapWatch::Answer scene;
-  if (frame.index > s.map.frame) scene = s.map_watch.update(pair.left, seen.left_mask);
-  estimate.times.track_ms = watch.lap_ms();
-
-  if (!tip.visible || scene.veiled) {
-    estimate.status = FrameStatus::tool_lost;
-    ++s.lost_frames;
-    if (s.contact && frame.time_s - s.last_seen_s > kLongestLost_s) s.end_contact(s.last_tip_mm);
-    if (!s.contact) s.onset.lose();
-    return estimate;
-  }
-  s.last_seen_s = frame.time_s;
-  s.last_tip_mm = tip.tip_mm;
-  estimate.tip_mm = tip.tip_mm;
-
-  // Where the map no longer lies nothing begins to touch it, and a picture that stands still says nothing about the
-  // tip.
-  const bool stale = scene.map_is_stale;
-  if (stale) estimate.status = FrameStatus::map_stale;
-  if (!s.contact && !stale && !repeated && frame.index > s.map.frame) s.look_for_contact(pair, seen);
+  for (Hand& hand : s.hands) s.follow_tip(hand, seen, of(hand.instrument));
   estimate.times.contact_ms = watch.lap_ms();
-  if (!s.contact) {
-    s.lost_frames = 0;
-    return estimate;
-  }
 
-  const auto equilibrium = s.solve_contact(pair, seen, estimate);
-  s.lost_frames = 0;
+  std::vector<std::optional<TipContact::Answer>> answers(s.hands.size());
+  for (Hand& hand : s.hands)
+    if (hand.contact && of(hand.instrument).status != FrameStatus::tool_lost)
+      answers[hand.instrument] = s.solve_contact(hand, seen, of(hand.instrument));
+  const Equilibrium equilibrium = s.solve_together(answers);
   estimate.times.solve_ms = watch.lap_ms();
-  if (!equilibrium) return estimate;
 
-  s.report(*equilibrium, estimate);
-  if (stale && estimate.status == FrameStatus::ok) estimate.status = FrameStatus::map_stale;
-  if (estimate.status == FrameStatus::not_converged) return estimate;
-  estimate.node_von_mises_kPa = node_von_mises_kPa(s.body->model(), equilibrium->u);
-  estimate.max_von_mises_kPa =
-      *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
+  for (const Hand& hand : s.hands)
+    if (answers[hand.instrument]) s.report(hand, equilibrium, seen.scene.map_is_stale, of(hand.instrument));
+  if (equilibrium.converged) s.show(equilibrium, estimate);
+  if (std::none_of(s.hands.begin(), s.hands.end(), [](const Hand& hand) { return hand.contact.has_value(); }))
+    s.come_to_rest();
   estimate.times.stress_ms = watch.lap_ms();
+  for (ForceEstimate& other : estimate.further) other.times = estimate.times;
   return estimate;
 }
 
