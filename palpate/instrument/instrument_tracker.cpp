@@ -9,6 +9,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/segment.h"
+#include "palpate/instrument/segmentation_network.h"
 #include "palpate/instrument/tip_tracker.h"
 
 namespace palpate {
@@ -45,6 +46,7 @@ double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& ex
 struct InstrumentTracker::State {
   Rectification rectification;
   std::array<SegmentationModel, 2> models;
+  std::vector<SegmentationNetwork> networks;  ///< one for each eye, or none
   std::vector<TipTrack> tracks;
   double time_offset_s = 0;
   std::vector<TipTracker> trackers;
@@ -75,7 +77,7 @@ std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& tr
 SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) const {
   SeenByEye seen;
   seen.of_tracker.fill(-1);
-  seen.mask = segment_instrument(bgr, models[eye]);
+  seen.mask = networks.empty() ? segment_instrument(bgr, models[eye]) : networks[eye].mask(bgr);
   seen.instruments = find_instruments(seen.mask, models[eye].picture_area);
   return seen;
 }
@@ -200,12 +202,17 @@ EyeView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByEye& seen
   }
   if (seen.of_tracker[tracker] >= 0) result.tip = seen.instruments[static_cast<size_t>(seen.of_tracker[tracker])].tip;
   const std::optional<ImageTip> look_at = result.tip ? result.tip : expected(tracker, eye, seconds);
-  if (look_at) result.layers = layers_around(bgr, *look_at, models[eye]);
+  if (look_at && networks.empty()) result.layers = make_layers(bgr, region_around(*look_at), models[eye]);
+  if (look_at && !networks.empty()) result.layers = make_layers(bgr, region_around(*look_at), seen.mask);
   return result;
 }
 
 void describe(Settings& settings, InstrumentOptions& options) {
-  settings.text("segmentation", options.segmentation, "how the instrument is found in the images: colour");
+  settings.path("segmentation", options.segmentation,
+                "how the instrument is found in the images: colour, or a network as model.onnx (input 1 x 3 x height x "
+                "width, RGB from 0 to 1; output 1 x classes x height x width)");
+  settings.integer("class", options.instrument_class, {0, 1000},
+                   "the instrument's channel, from 0, where a network has several");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
   settings.group("camera_from_robot", "how the axes of the tracks lie; palpate check finds it",
@@ -215,11 +222,11 @@ void describe(Settings& settings, InstrumentOptions& options) {
   settings.after_reading([&options] {
     if (!options.track_2.empty() && options.track.empty())
       throw BadInput("instrument.track_2 is given without instrument.track, expected both or only track");
-    if (options.segmentation == "colour") return;
-    if (options.segmentation.ends_with(".onnx"))
-      throw BadInput(fmt::format("instrument.segmentation is '{}': networks are not there yet, expected colour",
-                                 options.segmentation));
-    throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour", options.segmentation));
+    if (options.segmentation.extension() == ".onnx") return;
+    if (options.segmentation.filename() != "colour")
+      throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour or a network as model.onnx",
+                                 options.segmentation.filename().string()));
+    options.segmentation = "colour";
   });
 }
 
@@ -231,6 +238,9 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
   for (const std::filesystem::path& track : {options.track, options.track_2})
     if (!track.empty()) state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
   state_->time_offset_s = options.time_offset_s;
+  if (options.segmentation != "colour")
+    for (int eye = 0; eye < 2; ++eye)
+      state_->networks.emplace_back(options.segmentation, options.instrument_class, rectification.size);
   tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
                        [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); });
 }

@@ -18,11 +18,12 @@ inline constexpr size_t kMostInstruments = 2;
 
 /// `instrument` of the scene file.
 struct InstrumentOptions {
-  std::string segmentation = "colour";  ///< how instruments are found in the images
-  std::filesystem::path track;          ///< tip.csv instead of the images
-  std::filesystem::path track_2;        ///< the same for the second instrument
-  CameraFromRobot camera_from_robot;    ///< axes of the tracks
-  double time_offset_s = 0;             ///< track time minus video time; 0: rows are found by frame number
+  std::filesystem::path segmentation = "colour";  ///< how instruments are found in the images
+  int instrument_class = 1;                       ///< channel of a network with several
+  std::filesystem::path track;                    ///< tip.csv instead of the images
+  std::filesystem::path track_2;                  ///< the same for the second instrument
+  CameraFromRobot camera_from_robot;              ///< axes of the tracks
+  double time_offset_s = 0;                       ///< track time minus video time; 0: rows are found by frame number
 };
 
 void describe(Settings& settings, InstrumentOptions& options);

@@ -67,17 +67,13 @@ class Profile {
   std::vector<double> low_, high_;
 };
 
-}  // namespace
-
-ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const SegmentationModel& model) {
+ImageLayers layers_of(const cv::Mat& bgr, const cv::Rect& region, const cv::Mat& metal) {
   ImageLayers layers;
-  layers.region = region & cv::Rect({}, bgr.size());
-  if (layers.region.area() == 0) return layers;
-  const cv::Mat part = bgr(layers.region);
+  layers.region = region;
   cv::Mat grey;
-  cv::cvtColor(part, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(bgr(region), grey, cv::COLOR_BGR2GRAY);
   grey.convertTo(layers.brightness[0], CV_32F);
-  metalness(bgr, layers.region, model).convertTo(layers.metal[0], CV_32F);
+  metal.convertTo(layers.metal[0], CV_32F);
   cv::GaussianBlur(layers.brightness[0], layers.brightness[0], {5, 5}, 0.9);
   cv::GaussianBlur(layers.metal[0], layers.metal[0], {7, 7}, 1.3);
   for (size_t level = 1; level < ImageLayers::kLevels; ++level) {
@@ -85,6 +81,18 @@ ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const Segmen
     cv::pyrDown(layers.metal[level - 1], layers.metal[level]);
   }
   return layers;
+}
+
+}  // namespace
+
+ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const SegmentationModel& model) {
+  const cv::Rect inside = region & cv::Rect({}, bgr.size());
+  return inside.area() == 0 ? ImageLayers() : layers_of(bgr, inside, metalness(bgr, inside, model));
+}
+
+ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const cv::Mat& mask) {
+  const cv::Rect inside = region & cv::Rect({}, bgr.size());
+  return inside.area() == 0 ? ImageLayers() : layers_of(bgr, inside, mask(inside));
 }
 
 PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, const ImageTip& tip, double length_px) {

@@ -20,6 +20,9 @@ struct ImageLayers {
 
 ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const SegmentationModel& model);
 
+/// The same where a mask tells what is metal.
+ImageLayers make_layers(const cv::Mat& bgr, const cv::Rect& region, const cv::Mat& mask);
+
 /// One pixel of a template, relative to the centre of its cell, px of the full image.
 struct CellSample {
   float dx, dy;

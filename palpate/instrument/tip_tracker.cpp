@@ -25,14 +25,6 @@ double followed_length_px(const ImageTip& tip) {
   return std::clamp(kTemplateWidths * tip.width_px, 60.0, 220.0);
 }
 
-cv::Rect region_around(const ImageTip& tip) {
-  const double margin = 0.6 * tip.width_px + 36;
-  const cv::Point2d back = tip.tip_px - followed_length_px(tip) * tip.axis;
-  const double x0 = std::min(tip.tip_px.x, back.x) - margin, x1 = std::max(tip.tip_px.x, back.x) + margin;
-  const double y0 = std::min(tip.tip_px.y, back.y) - margin, y1 = std::max(tip.tip_px.y, back.y) + margin;
-  return {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)};
-}
-
 Vec3 rectified_point(const Rectification& r, const cv::Point2d& left_px, double disparity) {
   const double z = r.depth_mm(disparity);
   return {(left_px.x - r.principal_x_px) * z / r.focal_px, (left_px.y - r.principal_y_px) * z / r.focal_px, z};
@@ -44,8 +36,12 @@ cv::Point2d left_pixel(const Rectification& r, const Vec3& p) {
 
 }  // namespace
 
-ImageLayers layers_around(const cv::Mat& bgr, const ImageTip& tip, const SegmentationModel& model) {
-  return make_layers(bgr, region_around(tip), model);
+cv::Rect region_around(const ImageTip& tip) {
+  const double margin = 0.6 * tip.width_px + 36;
+  const cv::Point2d back = tip.tip_px - followed_length_px(tip) * tip.axis;
+  const double x0 = std::min(tip.tip_px.x, back.x) - margin, x1 = std::max(tip.tip_px.x, back.x) + margin;
+  const double y0 = std::min(tip.tip_px.y, back.y) - margin, y1 = std::max(tip.tip_px.y, back.y) + margin;
+  return {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)};
 }
 
 bool can_be_one_tip(const ImageTip& left, const ImageTip& right) {

@@ -18,8 +18,8 @@ struct EyeView {
   ImageLayers layers;           ///< around the tip, or around where it was last
 };
 
-/// Layers around a tip, as far as TipTracker looks.
-ImageLayers layers_around(const cv::Mat& bgr, const ImageTip& tip, const SegmentationModel& model);
+/// The part of the image around a tip in which TipTracker looks.
+cv::Rect region_around(const ImageTip& tip);
 
 /// Whether two tips can be the same one seen by the left and the right eye.
 bool can_be_one_tip(const ImageTip& left, const ImageTip& right);

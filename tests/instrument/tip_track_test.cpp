@@ -84,8 +84,8 @@ TEST_F(TipTrackFile, ReplacesTheImages) {
   EXPECT_NEAR((*seen[4].since_mark_mm - Vec3(0.8, 0, 1)).norm(), 0, 1e-12);
 }
 
-TEST(InstrumentOptions, SayThatNetworksAreNotThereYet) {
-  for (const char* word : {"tool.onnx", "colours"}) {
+TEST(InstrumentOptions, RefuseAnUnknownSegmentation) {
+  for (const char* word : {"tool.pt", "colours"}) {
     InstrumentOptions options;
     options.segmentation = "colour";
     Settings settings;
