@@ -21,7 +21,7 @@ h1{font-size:1.7rem;line-height:1.2}h2{margin:2.5rem 0 .3rem;font-size:1.25rem}
 table{border-collapse:collapse;font-size:.84rem;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .55rem;border-bottom:1px solid var(--line);text-align:right;vertical-align:bottom}
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:var(--paper)}
-td.words{min-width:13rem;text-align:left}
+td{white-space:nowrap}td.words{white-space:normal;min-width:13rem;text-align:left}
 .good{color:var(--good)}.bad{color:var(--bad);font-weight:600}
 .charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem;margin:1rem 0}
 .chart{position:relative;height:19rem;min-width:0}video,img{width:100%;border-radius:.3rem}figure{margin:0}
@@ -123,6 +123,8 @@ function charts(parent, experiment) {
   const sets = done.filter(r => !r.real && r.series && r.series.estimate)
     .map(r => ({label: r.label || 'estimate', points: r.series.estimate}));
   if (truth) sets.push({label: 'truth', points: truth.series.truth, colour: '#777', dash: [5, 4]});
+  const sensor = done.find(r => r.series && r.series.sensor);
+  if (sensor) sets.push({label: 'sensor, aligned', points: sensor.series.sensor, colour: '#2a9d6f', dash: [2, 3]});
   if (sets.length) chart(grid, 'Force over time', 'time (s)', 'force (N)', sets, false, false);
   if (experiment.clip) {
     const video = add(add(grid, 'div'), 'video');

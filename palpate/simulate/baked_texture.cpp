@@ -57,7 +57,8 @@ void BakedTexture::bake(size_t triangle) const {
   for (int j = 0; j <= steps; ++j)
     for (int i = 0; i + j <= steps; ++i) {
       const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-      texels_[static_cast<size_t>(grid.first + place(steps, i, j))] =
+      const int at = grid.first + place(steps, i, j);
+      texels_[static_cast<size_t>(at)] =
           texture_(between(rest_.vertices_mm, u, v), between(normals_, u, v).normalized());
     }
   grid.state.store(State::known, std::memory_order_release);
@@ -72,7 +73,10 @@ BakedTexture::Spot BakedTexture::spot(int triangle, float u, float v) const {
   const int j = std::min(static_cast<int>(y), steps - 1);
   const int i = std::min(static_cast<int>(x), steps - 1 - j);
   const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j);
-  const auto texel = [&](int a, int b) { return &texels_[static_cast<size_t>(grid.first + place(steps, a, b))]; };
+  const auto texel = [&](int a, int b) {
+    const int at = grid.first + place(steps, a, b);
+    return &texels_[static_cast<size_t>(at)];
+  };
   const bool upper = fx + fy > 1 && i + j + 2 <= steps;
   const Spot found = upper ? Spot{texel(i + 1, j + 1), texel(i, j + 1), texel(i + 1, j), 1 - fx, 1 - fy}
                            : Spot{texel(i, j), texel(i + 1, j), texel(i, j + 1), fx, fy};
