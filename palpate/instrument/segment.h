@@ -31,7 +31,8 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
 cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model);
 
 /// How much each pixel of a part of the image looks like metal, 8-bit: 255 = without any redness
-/// (r - min(g, b)) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to tell.
+/// (r - min(g, b)) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to
+/// tell.
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model);
 
 }  // namespace palpate
