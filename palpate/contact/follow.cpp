@@ -22,6 +22,12 @@ constexpr double kLeastFollowingStepShare = 0.25;
 constexpr double kStepDeviation_mm = 0.05;
 constexpr double kPointsThatAgree = 6;
 
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 Vec3 across(const Vec3& motion, const Vec3& at) {
   const Vec3 ray = at.normalized();
   return motion - motion.dot(ray) * ray;
@@ -34,7 +40,7 @@ Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Ve
   if (seen.empty()) return follow;
   // Along the viewing ray a displacement is known far worse than across it: weigh both by their deviation.
   double predicted_seen = 0, predicted_predicted = 0, sum_of_squares = 0;
-  std::vector<double> misfit;
+  std::vector<double> misfit, motion;
   for (size_t i = 0; i < seen.size(); ++i) {
     constexpr double kAcrossDeviation_mm = 0.05;
     const Vec3 ray = seen[i].rest_mm.normalized();
@@ -46,12 +52,13 @@ Follow compare_motion(const std::vector<TissuePoint>& seen, const std::vector<Ve
     const double p_squared = p.squaredNorm() - (1 - along_weight) * p_along * p_along;
     predicted_predicted += p_squared;
     sum_of_squares += p_squared;
+    motion.push_back(across(s, seen[i].rest_mm).norm());
     misfit.push_back((p - s - (1 - along_weight) * ray.dot(p - s) * ray).norm());
   }
   follow.predicted_mm = std::sqrt(sum_of_squares / static_cast<double>(seen.size()));
   if (predicted_predicted > 0) follow.share = predicted_seen / predicted_predicted;
-  std::nth_element(misfit.begin(), misfit.begin() + static_cast<std::ptrdiff_t>(misfit.size() / 2), misfit.end());
-  follow.misfit_mm = misfit[misfit.size() / 2];
+  follow.misfit_mm = median_of(misfit);
+  follow.seen_mm = median_of(motion);
   follow.let_go = follow.points >= kFewestPoints && follow.predicted_mm > kLeastTellingMotion_mm &&
                   follow.share < kLeastFollowingShare;
   return follow;

@@ -14,6 +14,7 @@ struct Follow {
   double share = 1;         ///< least-squares factor from predicted to seen motion: 1 = follows, 0 = stays at rest
   double predicted_mm = 0;  ///< RMS of the predicted motion at these points
   double misfit_mm = 0;     ///< median distance between predicted and seen motion
+  double seen_mm = 0;       ///< median of the seen motion, across the viewing ray
   bool let_go = false;      ///< the prediction is large enough to tell, and the tissue does not follow it
 };
 

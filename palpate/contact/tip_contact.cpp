@@ -15,8 +15,9 @@ constexpr int kPressedFrames = 2;
 /// turn out to take the tissue along.
 constexpr double kPressesAgain_mm = 0.2;
 /// A tip that goes back by so much from one frame to the next lifts where it is nearly back at the surface, or where
-/// the tissue is seen to have come to rest: the share of the predicted motion, and one standard deviation more.
-constexpr double kLiftStep_mm = 0.08, kNearlyBack_mm = 0.15, kRestingShare = 0.3;
+/// the tissue is seen to have come to rest: it has not moved, and a share of the predicted motion, one standard
+/// deviation more, is less.
+constexpr double kLiftStep_mm = 0.08, kNearlyBack_mm = 0.15, kRestingShare = 0.3, kResting_mm = 0.03;
 /// Of a tracked point across the viewing ray, mm; so many neighbours share their errors.
 constexpr double kPointDeviation_mm = 0.05;
 constexpr double kPointsThatAgree = 6;
@@ -98,7 +99,8 @@ bool TipContact::lifts(const Follow& follow, double height_mm) const {
   if (!has_pressed() || height_mm - last_height_mm_ < kLiftStep_mm) return false;
   if (height_mm > -kNearlyBack_mm) return true;
   const double all_mm = std::sqrt(follow.points / kPointsThatAgree) * follow.predicted_mm;
-  return follow.points >= kFewestFollowingPoints && follow.share + kPointDeviation_mm / all_mm < kRestingShare;
+  return follow.points >= kFewestFollowingPoints && follow.seen_mm < kResting_mm &&
+         follow.share + kPointDeviation_mm / all_mm < kRestingShare;
 }
 
 TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm) {

@@ -47,9 +47,13 @@ TEST(GripJudge, ATipThatTakesTheTissueAlongGrasps) {
   EXPECT_EQ(judged(1, 10), Grip::grasp);
 }
 
-TEST(GripJudge, AStiffnessSlightlyOffChangesNothing) {
-  EXPECT_EQ(judged(0.75, 20), Grip::grasp);
-  EXPECT_EQ(judged(0.25, 20), Grip::push);
+TEST(GripJudge, TissueThatMovesLessOrMoreThanTheModelSaysChangesNothing) {
+  for (const double share : {0.4, 0.7, 1.3}) EXPECT_EQ(judged(share, 20), Grip::grasp) << share;
+  for (const double share : {-0.3, 0.12}) EXPECT_EQ(judged(share, 20), Grip::push) << share;
+}
+
+TEST(GripJudge, TissueThatMovesInBetweenTellsNothing) {
+  EXPECT_EQ(judged(0.25, 20), Grip::automatic);
 }
 
 TEST(GripJudge, ANormalPressTellsNothing) {

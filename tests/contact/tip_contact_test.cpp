@@ -192,6 +192,17 @@ TEST(TipContact, JawsThatStillCloseAreNoPull) {
   }
 }
 
+TEST(TipContact, FrictionToldTooHighLosesNoContact) {
+  Scene scene(Grip::push, Grip::automatic, 0.05);
+  for (const Vec3& p : press_drag_lift(0)) {
+    const Vec3 trembling = p + Vec3(0, 0, std::min(p.z(), 0.06) * std::sin(40 * p.x()));
+    const TipContact::Answer answer = scene.move(trembling);
+    if (p.z() > 0.6) {
+      EXPECT_EQ(answer.state, State::touching) << p.transpose();
+    }
+  }
+}
+
 TEST(TipContact, FrictionToldTooLowIsMadeUpForByWhatIsSeen) {
   constexpr double kTrueFriction = 0.6;
   Scene scene(Grip::push, Grip::automatic, kTrueFriction);
