@@ -145,10 +145,10 @@ std::string glance_table(const Json& page) {
 }
 
 std::string ranking_table(const Json& ranking) {
-  std::string table = "| setting | how wrong it may be | the force then changes by | slope |\n|---|---|---|---|\n";
+  std::string table = "| setting | the force changes by | if it is wrong by | slope |\n|---|---|---|---|\n";
   for (const Json& row : ranking)
-    table += fmt::format("| {} | {} | {:+.1f} % | {} |\n", text(row["title"]), text(row["uncertainty"]),
-                         row["effect_pct"].get<double>(), text(row["slope"]));
+    table += fmt::format("| {} | {:+.1f} % | {} | {} |\n", text(row["title"]), row["effect_pct"].get<double>(),
+                         text(row["uncertainty"]), text(row["slope"]));
   return table;
 }
 

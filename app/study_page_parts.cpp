@@ -21,7 +21,7 @@ h1{font-size:1.7rem;line-height:1.2}h2{margin:2.5rem 0 .3rem;font-size:1.25rem}
 table{border-collapse:collapse;font-size:.84rem;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .55rem;border-bottom:1px solid var(--line);text-align:right;vertical-align:bottom}
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:var(--paper)}
-td{white-space:nowrap}td.words{white-space:normal;min-width:13rem;text-align:left}
+td{white-space:nowrap}td:first-child{white-space:normal;min-width:6rem}td.words{white-space:normal;min-width:13rem;text-align:left}
 .good{color:var(--good)}.bad{color:var(--bad);font-weight:600}
 .charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem;margin:1rem 0}
 .chart{position:relative;height:19rem;min-width:0}video,img{width:100%;border-radius:.3rem}figure{margin:0}
@@ -138,11 +138,11 @@ if (data.ranking && data.ranking.length) {
   add(root, 'h2', 'What matters most');
   add(root, 'p', 'The estimated force, when one setting is as wrong as it may well be and all else is known.');
   const node = add(add(root, 'div', undefined, 'table'), 'table'), head = add(add(node, 'thead'), 'tr');
-  ['setting', 'how wrong it may be', 'force changes by', 'slope'].forEach(title => add(head, 'th', title));
+  ['setting', 'force changes by', 'if it is wrong by', 'slope'].forEach(title => add(head, 'th', title));
   const body = add(node, 'tbody');
   data.ranking.forEach(r => {
     const row = add(body, 'tr');
-    [r.title, r.uncertainty, (r.effect_pct > 0 ? '+' : '') + r.effect_pct.toFixed(1) + ' %', r.slope]
+    [r.title, (r.effect_pct > 0 ? '+' : '') + r.effect_pct.toFixed(1) + ' %', r.uncertainty, r.slope]
       .forEach((text, i) => add(row, 'td', text, i === 3 ? 'words' : undefined));
   });
 }

@@ -202,6 +202,7 @@ Json sensitivity_of_cases(const StudyExperiment& experiment, const Json& runs) {
 /// What a sweep of numbers says in words.
 std::string findings_of(const StudyExperiment& experiment, const Json& runs, const Json& sensitivity) {
   std::string text;
+  const std::string unit = experiment.unit.empty() ? "" : " " + experiment.unit;
   const Points errors = over_setting(runs, "force_nrmse_pct");
   if (const auto slope = slope_of(over_setting(runs, "peak_force_N"), true); slope && experiment.logarithmic)
     text += fmt::format("The estimated peak goes with {} to the power {:.3f}. ", experiment.key, slope->slope);
@@ -214,8 +215,8 @@ std::string findings_of(const StudyExperiment& experiment, const Json& runs, con
     if (worst.second - best.second < 0.05)
       text += fmt::format("The error is {:.1f} % at every value.", best.second);
     else
-      text += fmt::format("The error is least, {:.3g} %, at {:g} {} and largest, {:.3g} %, at {:g} {}.", best.second,
-                          best.first, experiment.unit, worst.second, worst.first, experiment.unit);
+      text += fmt::format("The error is least, {:.3g} %, at {:g}{} and largest, {:.3g} %, at {:g}{}.", best.second,
+                          best.first, unit, worst.second, worst.first, unit);
   }
   return text;
 }
