@@ -112,12 +112,21 @@ class PictureChoice {
   std::vector<Offered> pictures_;
 };
 
+/// truth_2.csv beside truth.csv, where there is one.
+std::optional<std::filesystem::path> second_truth(const std::filesystem::path& truth) {
+  std::filesystem::path second = truth;
+  second.replace_filename(truth.stem().string() + "_2" + truth.extension().string());
+  if (truth.empty() || !std::filesystem::exists(second)) return {};
+  return second;
+}
+
 /// Everything that grows frame by frame, and the page that is made of it at the end, whatever the end is.
 struct RunFiles {
   const SceneFile& scene_file;
   const RunOptions& options;
   const BuiltMap& built;
   ForcesWriter forces;
+  SecondForcesWriter forces_2;
   VideoWriter overlay;
   OverlayPainter painter;
   PictureChoice pictures;
@@ -129,6 +138,7 @@ struct RunFiles {
         options(o),
         built(b),
         forces(o.folder / "forces.csv"),
+        forces_2(o.folder / "forces_2.csv"),
         overlay(o.folder / "overlay.mp4", recording.fps(), recording.size()),
         painter(b.rectification, s.scene.tissue, s.overlay),
         pictures(recording.frame_count()) {}
@@ -137,7 +147,9 @@ struct RunFiles {
     Stopwatch watch;
     const cv::Mat picture = painter.paint(frame.left, estimate);
     estimate.times.draw_ms = watch.lap_ms();
+    for (ForceEstimate& other : estimate.further) other.times = estimate.times;
     forces.write(estimate);
+    forces_2.write(estimate);
     overlay.write(picture);
     pictures.offer(picture, estimate);
     rows.push_back(to_row(estimate));
@@ -149,9 +161,12 @@ struct RunFiles {
     Report report;
     report.title = std::filesystem::weakly_canonical(options.folder).filename().string();
     report.rows = rows;
+    report.rows_2 = forces_2.rows();
     if (!options.truth.empty()) report.truth = read_truth(options.truth);
+    if (const auto truth_2 = second_truth(options.truth); truth_2) report.truth_2 = read_truth(*truth_2);
     // Frames are matched by number; a truth may count its time from elsewhere, or name none.
-    for (ForceRow& row : report.truth) row.time_s = row.frame / built.fps;
+    for (std::vector<ForceRow>* truth : {&report.truth, &report.truth_2})
+      for (ForceRow& row : *truth) row.time_s = row.frame / built.fps;
     report.times = times;
     report.tissue = scene_file.scene.tissue;
     report.settings = run_yaml(scene_file, built.rectification);
@@ -177,6 +192,10 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   }
   summary.frames_by_warning = count_warnings(files.rows);
   if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_truth(files.options.truth));
+  for (const ForceRow& row : files.forces_2.rows())
+    summary.peak_force_2_N = std::max(summary.peak_force_2_N.value_or(0), row.force_magnitude_N);
+  if (const auto truth_2 = second_truth(files.options.truth); truth_2 && summary.peak_force_2_N)
+    summary.comparison_2 = compare(files.forces_2.rows(), read_truth(*truth_2));
   return summary;
 }
 
@@ -314,7 +333,10 @@ std::string to_text(const RunSummary& summary) {
     line("instrument", "not seen in any frame");
   for (const auto& [name, frames] : summary.frames_by_warning)
     line("warning", fmt::format("{} frames: {} ({})", frames, warning_words(name), name));
+  if (summary.peak_force_2_N)
+    line("second instrument", fmt::format("peak force {:.2f} N, forces_2.csv", *summary.peak_force_2_N));
   if (summary.comparison) text += text_of_comparison(*summary.comparison);
+  if (summary.comparison_2) text += "second instrument:\n" + text_of_comparison(*summary.comparison_2);
   line("written to", summary.folder.string());
   return text;
 }
@@ -332,7 +354,10 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["tissue"] = tissue_json(summary.tissue);
   json["peak_force_N"] = summary.peak_force_N;
   json["peak_force_per_modulus_N_per_kPa"] = force_per_modulus_N_per_kPa(summary);
+  if (summary.peak_force_2_N) json["peak_force_2_N"] = *summary.peak_force_2_N;
   if (summary.comparison) json["comparison"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison));
+  if (summary.comparison_2)
+    json["comparison_2"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison_2));
   return json;
 }
 

@@ -12,7 +12,7 @@ namespace palpate::app {
 
 struct RunOptions {
   std::filesystem::path folder;
-  std::filesystem::path truth;  ///< empty = none
+  std::filesystem::path truth;  ///< empty = none; truth_2.csv beside it is that of a second instrument
   bool quiet = false;           ///< no progress, no sentences
 };
 
@@ -29,6 +29,8 @@ struct RunSummary {
   std::map<std::string, int> frames_by_status;
   std::map<std::string, int> frames_by_warning;
   std::optional<Comparison> comparison;
+  std::optional<double> peak_force_2_N;  ///< of a second instrument, where one came into view
+  std::optional<Comparison> comparison_2;
 };
 
 /// A map, and the frame and recording it was built from.

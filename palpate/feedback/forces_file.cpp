@@ -111,6 +111,20 @@ void ForcesWriter::write(const ForceRow& row) {
   if (!stream_) throw Unfinished(fmt::format("cannot write {}: is the disk full?", file_.string()));
 }
 
+SecondForcesWriter::SecondForcesWriter(const std::filesystem::path& file) : file_(file) {
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+}
+
+void SecondForcesWriter::write(const ForceEstimate& estimate) {
+  if (estimate.further.empty()) return;
+  rows_.push_back(to_row(estimate.further.front()));
+  if (writer_) return writer_->write(rows_.back());
+  if (rows_.back().status == "tool_lost") return;
+  writer_.emplace(file_);
+  for (const ForceRow& row : rows_) writer_->write(row);
+}
+
 std::vector<ForceRow> read_forces(const std::filesystem::path& file) {
   const CsvTable table(file);
   for (const char* name : {"frame", "force_N"})

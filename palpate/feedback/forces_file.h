@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,23 @@ class ForcesWriter {
  private:
   std::filesystem::path file_;
   std::ofstream stream_;
+};
+
+/// forces_2.csv of a second instrument: begun when one comes into view, with a row for every frame.
+class SecondForcesWriter {
+ public:
+  /// Removes what an earlier run left there.
+  explicit SecondForcesWriter(const std::filesystem::path& file);
+
+  /// The answer to a frame for all instruments. Throws Unfinished when the disk does not take it.
+  void write(const ForceEstimate& estimate);
+  /// Every row so far; none while no second instrument has come into view.
+  std::vector<ForceRow> rows() const { return writer_ ? rows_ : std::vector<ForceRow>{}; }
+
+ private:
+  std::filesystem::path file_;
+  std::optional<ForcesWriter> writer_;
+  std::vector<ForceRow> rows_;
 };
 
 /// Rows of forces.csv or truth.csv in the order of the file; columns are found by name (CsvTable). frame and force_N

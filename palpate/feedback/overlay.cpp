@@ -60,13 +60,30 @@ cv::Mat rectified_pixels(const Rectification& r, const cv::Size& size) {
   return pixels;
 }
 
-bool stress_is_trusted(const ForceEstimate& estimate) {
-  return (estimate.status == FrameStatus::ok || estimate.status == FrameStatus::map_stale) &&
-         !estimate.deformed_nodes_mm.empty() && estimate.node_von_mises_kPa.size() == estimate.deformed_nodes_mm.size();
-}
-
 bool has_force(const ForceEstimate& estimate) {
   return estimate.status == FrameStatus::ok || estimate.status == FrameStatus::map_stale;
+}
+
+bool stress_is_trusted(const ForceEstimate& estimate) {
+  const bool any_force =
+      has_force(estimate) || std::any_of(estimate.further.begin(), estimate.further.end(), has_force);
+  return any_force && !estimate.deformed_nodes_mm.empty() &&
+         estimate.node_von_mises_kPa.size() == estimate.deformed_nodes_mm.size();
+}
+
+double greatest_stress_kPa(const ForceEstimate& estimate) {
+  double greatest = estimate.max_von_mises_kPa;
+  for (const ForceEstimate& other : estimate.further) greatest = std::max(greatest, other.max_von_mises_kPa);
+  return greatest;
+}
+
+/// Of all instruments, each once.
+std::vector<std::string> all_warnings(const ForceEstimate& estimate) {
+  std::vector<std::string> warnings = estimate.warnings;
+  for (const ForceEstimate& other : estimate.further)
+    for (const std::string& name : other.warnings)
+      if (std::find(warnings.begin(), warnings.end(), name) == warnings.end()) warnings.push_back(name);
+  return warnings;
 }
 
 /// The stress that `kShareAboveScale` of the surface exceeds, kPa.
@@ -110,6 +127,13 @@ float nearby(const Vec3& point, const Vec3& centre, double radius_mm) {
   return static_cast<float>(t * t * (3 - 2 * t));
 }
 
+float near_a_tip(const Vec3& point, const ForceEstimate& estimate, double radius_mm) {
+  float nearest = has_force(estimate) ? nearby(point, estimate.tip_mm, radius_mm) : 0;
+  for (const ForceEstimate& other : estimate.further)
+    if (has_force(other)) nearest = std::max(nearest, nearby(point, other.tip_mm, radius_mm));
+  return nearest;
+}
+
 cv::Point clamped(const cv::Point& p, const cv::Rect& area) {
   return {std::clamp(p.x, area.x, area.br().x), std::clamp(p.y, area.y, area.br().y)};
 }
@@ -148,6 +172,8 @@ cv::Mat OverlayPainter::paint(const cv::Mat& left_bgr, const ForceEstimate& esti
   cv::Mat image = left_bgr.clone();
   if (stress_is_trusted(estimate)) paint_stress(image, estimate);
   if (estimate.status != FrameStatus::tool_lost) draw_force(image, estimate);
+  for (const ForceEstimate& other : estimate.further)
+    if (other.status != FrameStatus::tool_lost) draw_force(image, other);
   draw_readings(image, estimate);
   draw_frame(image, estimate);
   return image;
@@ -158,8 +184,9 @@ void OverlayPainter::follow_scales(const ForceEstimate& estimate) {
   if (has_force(estimate)) force_N = estimate.force_N.norm();
   if (estimate.status == FrameStatus::no_contact) force_N = 0;
   chart_.add(estimate.time_s, force_N);
-  if (!has_force(estimate)) return;
-  nodal_force_scale_N_ = std::max(nodal_force_scale_N_, round_up(estimate.mean_nodal_force_N));
+  if (has_force(estimate)) nodal_force_scale_N_ = std::max(nodal_force_scale_N_, round_up(estimate.mean_nodal_force_N));
+  for (const ForceEstimate& other : estimate.further)
+    if (has_force(other)) nodal_force_scale_N_ = std::max(nodal_force_scale_N_, round_up(other.mean_nodal_force_N));
   if (options_.stress_scale_kPa > 0 || !stress_is_trusted(estimate)) return;
   const double stress_kPa = characteristic_stress_kPa(estimate);
   if (stress_kPa > stress_scale_kPa_) stress_scale_kPa_ = round_up(stress_kPa);
@@ -204,9 +231,10 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
         const Tint& tint = tints[static_cast<size_t>(std::min(level, 255.0))];
         float alpha = tint.alpha;
         if (options_.region == OverlayRegion::around)
-          alpha *= nearby(w0 * nodes[static_cast<size_t>(corners[0])] + w1 * nodes[static_cast<size_t>(corners[1])] +
-                              w2 * nodes[static_cast<size_t>(corners[2])],
-                          estimate.tip_mm, options_.radius_mm);
+          alpha *=
+              near_a_tip(w0 * nodes[static_cast<size_t>(corners[0])] + w1 * nodes[static_cast<size_t>(corners[1])] +
+                             w2 * nodes[static_cast<size_t>(corners[2])],
+                         estimate, options_.radius_mm);
         for (int c = 0; c < 3; ++c)
           pixel[column][c] =
               cv::saturate_cast<uchar>(static_cast<float>(pixel[column][c]) * (1 - alpha) + tint.bgr[c] * alpha);
@@ -272,8 +300,11 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
   const auto px = [scale](double size) { return cvRound(size * scale); };
   const auto [words, status_colour] = words_of(estimate.status);
   std::vector<std::string> warnings;
-  for (const std::string& name : estimate.warnings) warnings.push_back(warning_words(name));
+  for (const std::string& name : all_warnings(estimate)) warnings.push_back(warning_words(name));
   const bool caution = !warnings.empty() && status_colour != kDoubt;
+  for (size_t i = 0; i < estimate.further.size(); ++i)
+    if (const FrameStatus status = estimate.further[i].status; status != FrameStatus::tool_lost)
+      warnings.insert(warnings.begin(), fmt::format("instrument {}: {}", i + 2, words_of(status).first));
   const std::string time = fmt::format("{:.2f} s   frame {}", estimate.time_s, estimate.frame);
   int width = std::max(text_width(words, 11 * scale) + px(20), text_width(time, 8 * scale));
   for (const std::string& warning : warnings) width = std::max(width, text_width(warning, 8 * scale));
@@ -286,7 +317,7 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
     draw_text(image, warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kCaution);
 
   const std::string greatest =
-      stress_is_trusted(estimate) ? "max " + three_digits(estimate.max_von_mises_kPa) : "max -";
+      stress_is_trusted(estimate) ? "max " + three_digits(greatest_stress_kPa(estimate)) : "max -";
   const int bar_width = px(118);
   draw_colour_bar(image, {image.cols - bar_width - px(8), px(8), bar_width, px(220)}, colours_,
                   {0, stress_scale_kPa_, "von Mises (kPa)", greatest}, scale);

@@ -152,7 +152,13 @@ std::string force_section(const Report& report) {
   const auto force = [](const ForceRow& row) { return has_answer(row) ? row.force_magnitude_N : kGap; };
   chart.series.push_back(series_of("estimate", "estimate", report.rows, force));
   if (!report.truth.empty()) chart.series.push_back(series_of("truth", "truth", report.truth, force));
-  chart.lanes.push_back(lane_of("status", report.rows, [](const ForceRow& row) { return row.status; }));
+  if (!report.rows_2.empty())
+    chart.series.push_back(series_of("instrument 2", "estimate second", report.rows_2, force));
+  if (!report.truth_2.empty())
+    chart.series.push_back(series_of("truth of instrument 2", "truth second", report.truth_2, force));
+  const auto status = [](const ForceRow& row) { return row.status; };
+  chart.lanes.push_back(lane_of("status", report.rows, status));
+  if (!report.rows_2.empty()) chart.lanes.push_back(lane_of("second", report.rows_2, status));
   if (!report.truth.empty())
     chart.lanes.push_back(
         lane_of("truth", report.truth, [](const ForceRow& row) { return row.in_contact ? "true_contact" : ""; }));
@@ -160,10 +166,11 @@ std::string force_section(const Report& report) {
   std::map<std::string, int> frames;
   for (const ForceRow& row : report.rows) ++frames[row.status];
   std::string counts;
-  for (const auto& [status, count] : frames)
-    counts += fmt::format("{}{}: {}", counts.empty() ? "" : ", ", escape_html(status), count);
+  for (const auto& [name, count] : frames)
+    counts += fmt::format("{}{}: {}", counts.empty() ? "" : ", ", escape_html(name), count);
   std::string legend = "<span><i class=\"curve estimate\"></i>estimate</span>";
   if (!report.truth.empty()) legend += "<span><i class=\"curve truth\"></i>truth</span>";
+  if (!report.rows_2.empty()) legend += "<span><i class=\"curve estimate second\"></i>instrument 2</span>";
   legend +=
       "<span><i class=\"ok\"></i>contact</span><span><i class=\"no_contact\"></i>no contact</span>"
       "<span><i class=\"doubt\"></i>lost, not converged or stale</span>";

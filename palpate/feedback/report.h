@@ -15,11 +15,13 @@ struct ReportPicture {
   std::string caption;
 };
 
-/// What a run leaves to read. Truth, times, settings and pictures may be empty: their part is left out.
+/// What a run leaves to read. Truth, times, settings, pictures and what is of a second
+/// instrument may be empty: their part is left out.
 struct Report {
   std::string title;
   std::vector<ForceRow> rows;
   std::vector<ForceRow> truth;
+  std::vector<ForceRow> rows_2, truth_2;  ///< of a second instrument
   std::vector<FrameTimes> times;
   TissueOptions tissue;
   std::string settings;  ///< YAML of every setting in effect

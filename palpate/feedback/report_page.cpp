@@ -5,9 +5,9 @@ namespace {
 
 constexpr const char* kStyle = R"css(
 :root{--paper:#fff;--panel:#f5f7f8;--ink:#15202b;--faint:#5b6875;--line:#d9dfe4;--estimate:#0a6ebd;--truth:#d1650a;
---good:#2e9e5b;--idle:#b8c2cb;--doubt:#c43e6a;--caution:#d9a400}
+--good:#2e9e5b;--idle:#b8c2cb;--doubt:#c43e6a;--caution:#d9a400;--second:#7a4fc2}
 @media (prefers-color-scheme:dark){:root{--paper:#12171c;--panel:#1b222a;--ink:#e8edf2;--faint:#9aa7b4;--line:#33404c;
---estimate:#58b4ff;--truth:#ffab5c;--good:#49c97f;--idle:#4b5864;--doubt:#ff7da3}}
+--estimate:#58b4ff;--truth:#ffab5c;--good:#49c97f;--idle:#4b5864;--doubt:#ff7da3;--second:#b79bf2}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif;color-scheme:light dark}
 main{max-width:980px;margin:0 auto;padding:20px 16px 48px}
@@ -26,6 +26,7 @@ p{margin:.5em 0}
 .chart{margin:0 0 8px}
 polyline{fill:none;stroke-width:2;stroke-linejoin:round}
 .estimate{stroke:var(--estimate)}.truth{stroke:var(--truth);stroke-dasharray:6 4}
+.estimate.second{stroke:var(--second)}.truth.second{stroke:var(--second);stroke-dasharray:2 4}
 .grid{stroke:var(--line)}.cursor{stroke:var(--faint)}
 text{fill:var(--ink);font-size:12px}.tick{fill:var(--faint)}.end{text-anchor:end}.middle{text-anchor:middle}
 .readout{min-height:1.5em;font-variant-numeric:tabular-nums;color:var(--faint);font-size:.88rem}
@@ -33,6 +34,7 @@ text{fill:var(--ink);font-size:12px}.tick{fill:var(--faint)}.end{text-anchor:end
 .legend i{display:inline-block;width:18px;height:10px;border-radius:2px;margin-right:6px}
 .legend i.curve{height:0;border-top:3px solid;border-radius:0;vertical-align:middle}
 i.estimate{border-color:var(--estimate)!important}i.truth{border-color:var(--truth)!important;border-top-style:dashed!important}
+i.second{border-color:var(--second)!important}
 rect.ok,rect.contact{fill:var(--good)}rect.no_contact{fill:var(--idle)}
 rect.tool_lost,rect.not_converged,rect.map_stale{fill:var(--doubt)}rect.true_contact{fill:var(--truth)}
 i.ok{background:var(--good)}i.no_contact{background:var(--idle)}i.doubt{background:var(--doubt)}

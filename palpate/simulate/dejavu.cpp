@@ -76,26 +76,32 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
                               const std::filesystem::path& folder,
                               const std::function<void(int done, int total)>& progress) {
   check_gesture(options.gesture);
-  const GestureRow& approach = approach_row(options.gesture);
   const Surface organ = make_organ(options.body, kDrawnTriangles);
-  const TouchPoint touch = find_touch_point(organ, options.camera, approach.at_px);
-  const double radius_mm =
-      approach.footprint_radius_mm > 0 ? approach.footprint_radius_mm : contact.footprint_radius_mm;
+  std::vector<TouchPoint> touches;
+  std::vector<TruthContact> contacts;
+  const auto touch = [&](const std::vector<GestureRow>& gesture) {
+    const GestureRow& approach = approach_row(gesture);
+    touches.push_back(find_touch_point(organ, options.camera, approach.at_px));
+    contacts.push_back({touches.back().point_mm, touches.back().axes.col(0),
+                        approach.footprint_radius_mm > 0 ? approach.footprint_radius_mm : contact.footprint_radius_mm,
+                        is_push(gesture) ? longest_drag_mm(gesture) : 0});
+  };
+  touch(options.gesture);
+  if (options.second.present) touch(options.second.gesture);
   const bool push = is_push(options.gesture);
   const TruthBody truth = make_truth_body(
       make_organ(options.body, kFilledTriangles), options.body.elements, attachments,
-      [&](const Vec3& point) { return project(options.camera, point, 0); }, touch.point_mm, touch.axes.col(0),
-      radius_mm, push ? longest_drag_mm(options.gesture) : 0);
+      [&](const Vec3& point) { return project(options.camera, point, 0); }, contacts);
 
   DejaVuSummary summary;
-  summary.frames = static_cast<int>(std::lround(gesture_duration_s(options.gesture) * options.camera.fps)) + 1;
+  summary.frames = static_cast<int>(std::lround(motion_duration_s(options) * options.camera.fps)) + 1;
   summary.truth_elements = static_cast<int>(truth.mesh.tetrahedra.size());
   summary.truth_nodes = static_cast<int>(truth.mesh.nodes_mm.size());
-  summary.tied_nodes = static_cast<int>(truth.footprint.samples.size());
+  summary.tied_nodes = static_cast<int>(truth.patches[0].footprint.samples.size());
   summary.thickness_mm = mean_thickness_mm(organ);
-  summary.contact_mm = touch.point_mm;
-  summary.contact_normal = touch.axes.col(0);
-  summary.contact_radius_mm = truth.patch_radius_mm;
+  summary.contact_mm = touches[0].point_mm;
+  summary.contact_normal = touches[0].axes.col(0);
+  summary.contact_radius_mm = truth.patches[0].radius_mm;
   if (options.write.grip == SimulatedFiles::Grip::known) summary.grip = push ? Grip::push : Grip::grasp;
 
   const int fields = options.look.interlace ? 2 : 1;
@@ -107,20 +113,26 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
   const auto solve_start = Clock::now();
   MotionQuality quality;
   const std::vector<Moment> moments =
-      solve_motion(options, tissue, truth, touch, contact.friction, summary.frames, quality, step);
+      solve_motion(options, tissue, truth, touches, contact.friction, summary.frames, quality, step);
   summarise(moments, summary);
   summary.largest_residual = quality.largest_residual;
   summary.smallest_volume_ratio = quality.smallest_volume_ratio;
   summary.solve_s = seconds_since(solve_start);
 
   const auto draw_start = Clock::now();
-  Stage stage(options, organ, truth, moments.front().place);
+  Stage stage(options, organ, truth, moments.front());
   summary.organ_region_px = outline(stage.organ_mask());
   std::filesystem::create_directories(folder);
   write_calibration(folder / "calibration.yaml", options.camera);
   std::vector<TruthRow> rows;
   for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields)) rows.push_back(moments[i].truth);
   write_truth(folder / "truth.csv", rows);
+  if (options.second.present) {
+    std::vector<TruthRow> second_rows;
+    for (size_t i = 0; i < moments.size(); i += static_cast<size_t>(fields))
+      second_rows.push_back(moments[i].second_truth);
+    write_truth(folder / "truth_2.csv", second_rows);
+  }
   if (options.write.sensor) {
     const ForceSensor sensor = make_force_sensor(touching_axis(moments), options.look.seed);
     write_force_sensor(folder, sensor, log_of(sensor, rows, options.look.seed));

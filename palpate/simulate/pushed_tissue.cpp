@@ -63,8 +63,8 @@ PushedTissue::PushedTissue(const TetModel& model, const TruthBody& body, const T
       friction_(friction),
       normals_(vertex_normals(body.mesh.nodes_mm, body.boundary)),
       solver_(model, precision) {
-  const double patch_mm2 = std::numbers::pi * body.patch_radius_mm * body.patch_radius_mm;
-  spacing_mm_ = std::sqrt(patch_mm2 / static_cast<double>(body.footprint.samples.size())) / kSamplesPerEdge;
+  const double patch_mm2 = std::numbers::pi * body.patches[0].radius_mm * body.patches[0].radius_mm;
+  spacing_mm_ = std::sqrt(patch_mm2 / static_cast<double>(body.patches[0].footprint.samples.size())) / kSamplesPerEdge;
 }
 
 Footprint PushedTissue::disc_at(const Eigen::Vector2d& place_mm) const {
@@ -76,7 +76,7 @@ Footprint PushedTissue::disc_at(const Eigen::Vector2d& place_mm) const {
   if (!middle) throw BadInput("simulate.gesture: the instrument slides off the organ; move it less");
   Footprint disc;
   disc.samples.push_back(*middle);
-  const double radius_mm = body_.patch_radius_mm - kGrowthPerEdge * kSamplesPerEdge * spacing_mm_;
+  const double radius_mm = body_.patches[0].radius_mm - kGrowthPerEdge * kSamplesPerEdge * spacing_mm_;
   const int rings = static_cast<int>(radius_mm / spacing_mm_);
   for (int ring = 1; ring <= rings; ++ring)
     for (int i = 0; i < 6 * ring; ++i) {

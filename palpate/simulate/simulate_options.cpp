@@ -170,6 +170,20 @@ void describe_gesture_row(Settings& settings, GestureRow& row) {
   settings.number("leave_s", row.leave_s, {0, 60}, "with release: time in which the instrument goes away, s");
 }
 
+void describe_gesture(Settings& settings, std::vector<GestureRow>& gesture, const std::string& doc) {
+  settings.list(
+      "gesture", doc, [&gesture] { return static_cast<int>(gesture.size()); },
+      [&gesture](int count) { gesture.assign(static_cast<size_t>(count), GestureRow{}); },
+      [&gesture](Settings& s, int i) { describe_gesture_row(s, gesture[static_cast<size_t>(i)]); });
+}
+
+void describe_second(Settings& settings, SimulatedSecond& second) {
+  settings.group("instrument", "as simulate.instrument",
+                 [&](Settings& s) { describe_instrument(s, second.instrument); });
+  describe_gesture(settings, second.gesture,
+                   "as simulate.gesture; until it grasps, the instrument follows tissue that the first one moves");
+}
+
 void describe_files(Settings& settings, SimulatedFiles& files) {
   settings.flag("surface", files.surface, "surface/frame_0000.ply ...: the organ in each frame, left camera frame, mm");
   settings.flag("depth", files.depth,
@@ -196,16 +210,22 @@ void describe(Settings& settings, SimulateOptions& options) {
       "the whole scene moves by motion_mm (1 - cos(2 pi t / period_s)) / 2; moves of the gesture are measured "
       "from the moving tissue, so that the force is the same without",
       [&](Settings& s) { describe_breathing(s, options.breathing); });
-  settings.list(
-      "gesture",
-      "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, grasp, "
-      "push, during_s, hold_s, release",
-      [&options] { return static_cast<int>(options.gesture.size()); },
-      [&options](int count) { options.gesture.assign(static_cast<size_t>(count), GestureRow{}); },
-      [&options](Settings& s, int i) { describe_gesture_row(s, options.gesture[static_cast<size_t>(i)]); });
+  describe_gesture(
+      settings, options.gesture,
+      "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, "
+      "grasp, push, during_s, hold_s, release");
+  settings.group(
+      "second", "another instrument at work at the same time (truth_2.csv); both have to grasp",
+      [&](Settings& s) { describe_second(s, options.second); }, &options.second.present);
   settings.group("write", "what is written besides the recording and its truth",
                  [&](Settings& s) { describe_files(s, options.write); });
-  settings.after_reading([&options] { check_gesture(options.gesture); });
+  settings.after_reading([&options] {
+    check_gesture(options.gesture);
+    if (!options.second.present) return;
+    check_gesture(options.second.gesture);
+    if (is_push(options.gesture) || is_push(options.second.gesture))
+      throw BadInput("simulate.second: two instruments have to grasp, and one of the gestures pushes");
+  });
 }
 
 }  // namespace palpate

@@ -101,6 +101,13 @@ struct GestureRow {
   double leave_s = 0;
 };
 
+/// `simulate.second`: another instrument at work at the same time. Both hold what they touch.
+struct SimulatedSecond {
+  bool present = false;
+  SimulatedInstrument instrument;
+  std::vector<GestureRow> gesture;
+};
+
 /// `simulate.breathing`: the whole scene (organ, what lies behind it, instrument) goes there and back.
 struct SimulatedBreathing {
   Vec3 motion_mm = Vec3::Zero();  ///< from expired (where the sequence begins) to inspired, left camera frame
@@ -123,6 +130,7 @@ struct SimulateOptions {
   SimulatedInstrument instrument;
   SimulatedBreathing breathing;
   std::vector<GestureRow> gesture;
+  SimulatedSecond second;
   SimulatedFiles write;
 };
 

@@ -74,8 +74,7 @@ std::vector<Vec3> moved_by(std::vector<Vec3> points_mm, const Vec3& by_mm) {
 
 }  // namespace
 
-Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth,
-             const InstrumentPlace& first_place)
+Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth, const Moment& first)
     : options_(options),
       tissue_(take_look(options_)),
       organ_(organ),
@@ -88,8 +87,12 @@ Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBo
   organ_number_ = renderer_.add(organ_, {bloody(tissue_, look.blood, look.seed),
                                          texels_per_mm(organ_.vertices_mm[0].z()), look.roughness, look.reflectance});
   wall_number_ = renderer_.add(wall_, {wall_texture(look.seed), texels_per_mm(wall_.vertices_mm[0].z()), 0.6, 0.03});
-  instrument_number_ = renderer_.add(make_instrument(options.instrument, first_place),
-                                     instrument_look(options.instrument, first_place, look.seed));
+  instrument_number_ = renderer_.add(make_instrument(options.instrument, first.place),
+                                     instrument_look(options.instrument, first.place, look.seed));
+  if (options.second.present)
+    second_instrument_number_ =
+        renderer_.add(make_instrument(options.second.instrument, first.second_place),
+                      instrument_look(options.second.instrument, first.second_place, look.seed + 1));
 }
 
 void Stage::show(const Moment& moment) {
@@ -99,6 +102,9 @@ void Stage::show(const Moment& moment) {
   if (options_.breathing.motion_mm != Vec3::Zero())
     renderer_.move(wall_number_, moved_by(wall_.vertices_mm, moment.breath_mm));
   renderer_.move(instrument_number_, make_instrument(options_.instrument, moment.place).vertices_mm);
+  if (options_.second.present)
+    renderer_.move(second_instrument_number_,
+                   make_instrument(options_.second.instrument, moment.second_place).vertices_mm);
 }
 
 }  // namespace palpate

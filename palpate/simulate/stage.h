@@ -5,13 +5,12 @@
 
 namespace palpate {
 
-/// The three surfaces that are drawn: organ, the wall of the cavity behind it, instrument.
+/// The surfaces that are drawn: organ, the wall of the cavity behind it, instruments.
 class Stage {
  public:
-  /// `organ` at rest; the instrument in `first_place`. Throws BadInput when a picture that the look is taken from
-  /// cannot be read.
-  Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth,
-        const InstrumentPlace& first_place);
+  /// `organ` at rest; the instruments as in the `first` moment. Throws BadInput when a picture that the look is taken
+  /// from cannot be read.
+  Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth, const Moment& first);
 
   /// 255 where the left eye sees the organ before all others.
   cv::Mat organ_mask() { return renderer_.visible_mask(organ_number_); }
@@ -29,7 +28,7 @@ class Stage {
   Surface organ_, wall_, shown_organ_;
   Skin skin_;
   Renderer renderer_;
-  int organ_number_ = 0, wall_number_ = 0, instrument_number_ = 0;
+  int organ_number_ = 0, wall_number_ = 0, instrument_number_ = 0, second_instrument_number_ = -1;
 };
 
 }  // namespace palpate

@@ -15,8 +15,9 @@
 namespace palpate {
 namespace {
 
-const double kFocusRadii = 1.5;       // the mesh is finer within so many radii of the patch
-const double kFocusEdgeRatio = 0.25;  // of edges there to edges elsewhere
+const double kFocusRadii = 1.5;        // the mesh is finer within so many radii of the patch
+const double kFocusEdgeRatio = 0.25;   // of edges there to edges elsewhere
+const double kFurtherEdgeRadii = 0.5;  // longest edges around further patches, in radii
 
 const Vec3& at(const std::vector<Vec3>& values, int i) {
   return values[static_cast<size_t>(i)];
@@ -47,27 +48,37 @@ double area_moved_mm2(const TruthBody& body, const std::set<int>& tied) {
   return area;
 }
 
-}  // namespace
-
-TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
-                          const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
-                          const Vec3& contact_normal, double radius_mm, double drag_mm) {
-  TruthBody body;
-  const MeshFocus focus{contact_mm, kFocusRadii * radius_mm + drag_mm, kFocusEdgeRatio};
-  body.mesh = tetrahedralize(organ, elements, focus);
-  body.boundary = boundary_triangles(body.mesh);
-  body.fixed_nodes = select_attachments(body.mesh, attachments, project_px);
-
-  const std::vector<int> tied = patch_nodes(body, contact_mm, contact_normal, radius_mm);
+TruthPatch patch_of(const TruthBody& body, const TruthContact& contact) {
+  const std::vector<int> tied = patch_nodes(body, contact.point_mm, contact.normal, contact.radius_mm);
   for (int node : tied)
     if (std::binary_search(body.fixed_nodes.begin(), body.fixed_nodes.end(), node))
       throw BadInput("simulate.gesture: the instrument touches attached tissue; at_px has to lie outside attachments");
   if (tied.empty())
-    throw BadInput(fmt::format("simulate.gesture: footprint_radius_mm {} holds no node of the true body", radius_mm));
-  for (int node : tied) body.footprint.samples.push_back({{node, node, node}, Vec3::UnitX()});
-  body.footprint.center_mm = contact_mm;
-  body.footprint.normal = contact_normal;
-  body.patch_radius_mm = std::sqrt(area_moved_mm2(body, {tied.begin(), tied.end()}) / std::numbers::pi);
+    throw BadInput(
+        fmt::format("simulate.gesture: footprint_radius_mm {} holds no node of the true body", contact.radius_mm));
+  TruthPatch patch;
+  for (int node : tied) patch.footprint.samples.push_back({{node, node, node}, Vec3::UnitX()});
+  patch.footprint.center_mm = contact.point_mm;
+  patch.footprint.normal = contact.normal;
+  patch.radius_mm = std::sqrt(area_moved_mm2(body, {tied.begin(), tied.end()}) / std::numbers::pi);
+  return patch;
+}
+
+}  // namespace
+
+TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
+                          const std::function<cv::Point2d(const Vec3&)>& project_px,
+                          const std::vector<TruthContact>& contacts) {
+  TruthBody body;
+  const TruthContact& first = contacts.at(0);
+  const auto reach_mm = [](const TruthContact& contact) { return kFocusRadii * contact.radius_mm + contact.drag_mm; };
+  body.mesh = tetrahedralize(organ, elements, MeshFocus{first.point_mm, reach_mm(first), kFocusEdgeRatio});
+  for (size_t i = 1; i < contacts.size(); ++i)
+    body.mesh =
+        refine_near(body.mesh, contacts[i].point_mm, reach_mm(contacts[i]), kFurtherEdgeRadii * contacts[i].radius_mm);
+  body.boundary = boundary_triangles(body.mesh);
+  body.fixed_nodes = select_attachments(body.mesh, attachments, project_px);
+  for (const TruthContact& contact : contacts) body.patches.push_back(patch_of(body, contact));
   return body;
 }
 

@@ -8,22 +8,34 @@
 
 namespace palpate {
 
+/// Where an instrument will hold a body, at rest.
+struct TruthContact {
+  Vec3 point_mm = Vec3::Zero();
+  Vec3 normal = Vec3::UnitZ();  ///< outward
+  double radius_mm = 0;         ///< of the patch
+  double drag_mm = 0;           ///< how far it is dragged over the surface
+};
+
+/// What an instrument holds of a body.
+struct TruthPatch {
+  Footprint footprint;   ///< every surface node of the patch, tied to one displacement
+  double radius_mm = 0;  ///< of a disc with the area that the tied nodes move along
+};
+
 /// The body whose forces count as true: finer than the estimator's map and cut differently.
 struct TruthBody {
   TetMesh mesh;
   std::vector<Triangle> boundary;
   std::vector<int> fixed_nodes;
-  Footprint footprint;         ///< every surface node of the patch, tied to one displacement
-  double patch_radius_mm = 0;  ///< of a disc with the area that the tied nodes move along
+  std::vector<TruthPatch> patches;  ///< one for each contact
 };
 
-/// Fills the closed organ with about `elements` tetrahedra, finer around `contact_mm`, so that the patch of `radius_mm`
-/// is well sampled, also where it is dragged to, `drag_mm` away. `project_px` as in select_attachments. Throws BadInput
-/// when the body cannot be filled, when attachments select nothing or everything, or when the patch lies on attached
-/// tissue.
+/// Fills the closed organ with about `elements` tetrahedra, finer around each of `contacts` (at least one), so that the
+/// patch is well sampled, also where it is dragged to. `project_px` as in select_attachments. Throws BadInput when the
+/// body cannot be filled, when attachments select nothing or everything, or when a patch lies on attached tissue.
 TruthBody make_truth_body(const Surface& organ, int elements, const AttachmentOptions& attachments,
-                          const std::function<cv::Point2d(const Vec3&)>& project_px, const Vec3& contact_mm,
-                          const Vec3& contact_normal, double radius_mm, double drag_mm = 0);
+                          const std::function<cv::Point2d(const Vec3&)>& project_px,
+                          const std::vector<TruthContact>& contacts);
 
 /// A fine surface that rides on the boundary of a mesh: each point moves like the nearest point of the boundary.
 struct Skin {

@@ -25,7 +25,9 @@ struct Moment {
   TruthRow truth;
   InstrumentPlace place;
   Vec3 breath_mm = Vec3::Zero();  ///< by which the whole scene is displaced
-  Eigen::VectorXd u;              ///< of the true nodes, mm, without breathing; empty = at rest
+  TruthRow second_truth;          ///< of a second instrument, where there is one
+  InstrumentPlace second_place;
+  Eigen::VectorXd u;  ///< of the true nodes, mm, without breathing; empty = at rest
 };
 
 /// What the equilibria of a sequence have in common.
@@ -34,12 +36,15 @@ struct MotionQuality {
   double smallest_volume_ratio = 1;
 };
 
+/// Length of the longer gesture, s.
+double motion_duration_s(const SimulateOptions& options);
+
 /// The moments of `frames` frames, or of twice as many fields when the pictures are interlaced (field 2 k belongs to
-/// frame k, field 2 k + 1 is half a frame later). `friction` is that of a push. `step` is called after every moment.
-/// Throws BadInput when the tissue finds no equilibrium.
+/// frame k, field 2 k + 1 is half a frame later). `touches`: one for each instrument. `friction` is that of a push.
+/// `step` is called after every moment. Throws BadInput when the tissue finds no equilibrium.
 std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
-                                 const TouchPoint& touch, double friction, int frames, MotionQuality& quality,
-                                 const std::function<void()>& step);
+                                 const std::vector<TouchPoint>& touches, double friction, int frames,
+                                 MotionQuality& quality, const std::function<void()>& step);
 
 /// Pixel of an eye at (eye_x_mm, 0, 0), parallel to the left one, without distortion.
 cv::Point2d project(const SimulatedCamera& camera, const Vec3& point_mm, double eye_x_mm);

@@ -69,6 +69,32 @@ TEST_F(ForcesFile, KeepsEveryRowWhileTheWriterIsStillOpen) {
   EXPECT_EQ(read_forces(file("forces.csv")).size(), 2u);
 }
 
+TEST_F(ForcesFile, OfASecondInstrumentBeginsWhenOneIsSeenWithARowForEveryFrame) {
+  write("forces_2.csv", "of an earlier run");
+  SecondForcesWriter writer(file("forces_2.csv"));
+  EXPECT_FALSE(std::filesystem::exists(file("forces_2.csv")));
+  ForceEstimate estimate;
+  estimate.further.resize(1);
+  const auto answer = [&](int frame, FrameStatus status) {
+    estimate.frame = estimate.further[0].frame = frame;
+    estimate.further[0].status = status;
+    writer.write(estimate);
+  };
+  answer(0, FrameStatus::tool_lost);
+  answer(1, FrameStatus::tool_lost);
+  EXPECT_FALSE(std::filesystem::exists(file("forces_2.csv")));
+  EXPECT_TRUE(writer.rows().empty());
+  answer(2, FrameStatus::no_contact);
+  answer(3, FrameStatus::tool_lost);
+  const std::vector<ForceRow> rows = read_forces(file("forces_2.csv"));
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_EQ(writer.rows().size(), 4u);
+  for (int frame = 0; frame < 4; ++frame) {
+    EXPECT_EQ(rows[static_cast<size_t>(frame)].frame, frame);
+    EXPECT_EQ(rows[static_cast<size_t>(frame)].status, frame == 2 ? "no_contact" : "tool_lost");
+  }
+}
+
 TEST(ForceRow, OfALostToolIsAllZeros) {
   const ForceRow row = to_row(pull(FrameStatus::tool_lost));
   EXPECT_EQ(row.status, "tool_lost");

@@ -23,9 +23,8 @@ class PushedSlab : public ::testing::Test {
     underside.depth_mm = 3;
     AttachmentOptions attachments;
     attachments.regions = {underside};
-    return make_truth_body(
-        make_organ(slab(), 1500), 4000, attachments, [](const Vec3&) { return cv::Point2d(); }, touch.point_mm,
-        touch.axes.col(0), 4, 3);
+    return make_truth_body(make_organ(slab(), 1500), 4000, attachments, [](const Vec3&) { return cv::Point2d(); },
+                           {{touch.point_mm, touch.axes.col(0), 4, 3}});
   }
   static TissueOptions liver() {
     TissueOptions tissue;
@@ -98,7 +97,7 @@ TEST_F(PushedSlab, TouchesOnlyBelowTheSurface) {
 TEST_F(PushedSlab, ThatCannotSlideHasTheForceOfTissueThatIsHeld) {
   PushedTissue tissue = with_friction(1e6);
   EquilibriumSolver held(model, precise);
-  held.hold(make_footprint(model, body.boundary, touch.point_mm, body.patch_radius_mm));
+  held.hold(make_footprint(model, body.boundary, touch.point_mm, body.patches[0].radius_mm));
   for (const Vec3& move : {moved(-1, 0, 0), moved(-1.5, 1, 0.5)}) {
     const Vec3 pushed_N = tissue.move(move).equilibrium.force_N, held_N = held.solve(move).force_N;
     EXPECT_LT((pushed_N - held_N).norm(), 0.05 * held_N.norm());  // two ways to tie a disc on this mesh

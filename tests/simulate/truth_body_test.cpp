@@ -25,8 +25,8 @@ class TruthBodyTest : public ::testing::Test {
   }
 
   TruthBody make(const Vec3& at, const Vec3& outward) const {
-    return make_truth_body(
-        organ, 1200, demo.attachments, [](const Vec3&) { return cv::Point2d(); }, at, outward, 4);
+    return make_truth_body(organ, 1200, demo.attachments, [](const Vec3&) { return cv::Point2d(); },
+                           {{at, outward, 4}});
   }
 
   SimulatedCase demo;
@@ -36,12 +36,12 @@ class TruthBodyTest : public ::testing::Test {
 };
 
 TEST_F(TruthBodyTest, TiesOnlyFreeSurfaceNodesNearTheContact) {
-  ASSERT_GE(body.footprint.samples.size(), 6u);
-  for (const auto& sample : body.footprint.samples) {
+  ASSERT_GE(body.patches[0].footprint.samples.size(), 6u);
+  for (const auto& sample : body.patches[0].footprint.samples) {
     EXPECT_LT((body.mesh.nodes_mm[static_cast<size_t>(sample.nodes[0])] - touch).norm(), 4.5);
     EXPECT_EQ(sample.barycentric, Vec3::UnitX());
   }
-  EXPECT_NEAR(body.patch_radius_mm, 4, 0.8);
+  EXPECT_NEAR(body.patches[0].radius_mm, 4, 0.8);
 }
 
 TEST_F(TruthBodyTest, RefusesAContactOnAttachedTissue) {
@@ -57,7 +57,7 @@ TEST_F(TruthBodyTest, ForceIsWhatTheAttachmentsHoldAndTheSlopeOfTheEnergy) {
   EquilibriumOptions precise;
   precise.relative_residual = 1e-8;
   EquilibriumSolver solver(model, precise);
-  solver.hold(body.footprint);
+  solver.hold(body.patches[0].footprint);
   const Vec3 pull = 1.5 * normal;
   const double step = 1e-3;
   const auto energy_at = [&](const Vec3& move) { return model.energy(solver.solve(move).u); };

@@ -19,15 +19,15 @@ struct SmallCase {
     demo.simulate.body.elements = 900;
     demo.simulate.gesture.erase(demo.simulate.gesture.begin() + 4, demo.simulate.gesture.end() - 1);
     touch = find_touch_point(make_organ(demo.simulate.body, 5000), demo.simulate.camera, {408, 196});
-    truth = make_truth_body(
-        make_organ(demo.simulate.body, 1500), demo.simulate.body.elements, demo.attachments,
-        [&](const Vec3& p) { return project(demo.simulate.camera, p, 0); }, touch.point_mm, touch.axes.col(0), 3.5);
+    truth = make_truth_body(make_organ(demo.simulate.body, 1500), demo.simulate.body.elements, demo.attachments,
+                            [&](const Vec3& p) { return project(demo.simulate.camera, p, 0); },
+                            {{touch.point_mm, touch.axes.col(0), 3.5}});
   }
 
   std::vector<Moment> solve(double fps, int frames) {
     demo.simulate.camera.fps = fps;
     MotionQuality quality;
-    const auto moments = solve_motion(demo.simulate, demo.tissue, truth, touch, 0.3, frames, quality, [] {});
+    const auto moments = solve_motion(demo.simulate, demo.tissue, truth, {touch}, 0.3, frames, quality, [] {});
     EXPECT_LE(quality.largest_residual, 1e-8);
     return moments;
   }
