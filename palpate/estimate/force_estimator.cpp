@@ -223,15 +223,13 @@ struct ForceEstimator::State {
     return answer;
   }
 
-  /// The equilibrium under all tips that touch; a tip that was followed after another one has moved the tissue on.
-  Equilibrium solve_together(const std::vector<std::optional<TipContact::Answer>>& answers) {
+  /// The equilibrium under all tips that touch. Where there was more than `one_tip`, what a later one did in this frame
+  /// counts for the earlier ones, too.
+  Equilibrium solve_together(const std::vector<std::optional<TipContact::Answer>>& answers, bool one_tip) {
     Equilibrium last;
-    size_t touching = 0;
-    for (const auto& answer : answers) touching += answer.has_value();
     for (size_t i = 0; i < hands.size(); ++i) {
       if (!answers[i]) continue;
-      last =
-          touching == 1 ? answers[i]->equilibrium : body->solve(hands[i].contact->held().number(), answers[i]->tied_mm);
+      last = one_tip ? answers[i]->equilibrium : body->solve(hands[i].contact->held().number(), answers[i]->tied_mm);
     }
     return last;
   }
@@ -296,11 +294,12 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   for (Hand& hand : s.hands) s.follow_tip(hand, seen, of(hand.instrument));
   estimate.times.contact_ms = watch.lap_ms();
 
+  const auto tips = std::count_if(s.hands.begin(), s.hands.end(), [](const Hand& h) { return h.contact.has_value(); });
   std::vector<std::optional<TipContact::Answer>> answers(s.hands.size());
   for (Hand& hand : s.hands)
     if (hand.contact && of(hand.instrument).status != FrameStatus::tool_lost)
       answers[hand.instrument] = s.solve_contact(hand, seen, of(hand.instrument));
-  const Equilibrium equilibrium = s.solve_together(answers);
+  const Equilibrium equilibrium = s.solve_together(answers, tips == 1);
   estimate.times.solve_ms = watch.lap_ms();
 
   for (const Hand& hand : s.hands)

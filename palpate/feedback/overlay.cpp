@@ -302,19 +302,23 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
   std::vector<std::string> warnings;
   for (const std::string& name : all_warnings(estimate)) warnings.push_back(warning_words(name));
   const bool caution = !warnings.empty() && status_colour != kDoubt;
+  std::vector<std::string> others;
   for (size_t i = 0; i < estimate.further.size(); ++i)
     if (const FrameStatus status = estimate.further[i].status; status != FrameStatus::tool_lost)
-      warnings.insert(warnings.begin(), fmt::format("instrument {}: {}", i + 2, words_of(status).first));
+      others.push_back(fmt::format("instrument {}: {}", i + 2, words_of(status).first));
   const std::string time = fmt::format("{:.2f} s   frame {}", estimate.time_s, estimate.frame);
   int width = std::max(text_width(words, 11 * scale) + px(20), text_width(time, 8 * scale));
   for (const std::string& warning : warnings) width = std::max(width, text_width(warning, 8 * scale));
-  const int warning_lines = static_cast<int>(warnings.size());
-  draw_veil(image, {px(8), px(8), width + px(20), px(46 + 15 * warning_lines)});
+  for (const std::string& other : others) width = std::max(width, text_width(other, 8 * scale));
+  const int other_lines = static_cast<int>(others.size()), warning_lines = static_cast<int>(warnings.size());
+  draw_veil(image, {px(8), px(8), width + px(20), px(46 + 15 * (other_lines + warning_lines))});
   cv::circle(image, {px(23), px(23)}, px(5), caution ? kCaution : status_colour, cv::FILLED, cv::LINE_AA);
   draw_text(image, words, {px(36), px(28)}, 11 * scale, kInk);
   draw_text(image, time, {px(18), px(46)}, 8 * scale, kFaintInk);
+  for (int i = 0; i < other_lines; ++i)
+    draw_text(image, others[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kInk);
   for (int i = 0; i < warning_lines; ++i)
-    draw_text(image, warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * i)}, 8 * scale, kCaution);
+    draw_text(image, warnings[static_cast<size_t>(i)], {px(18), px(61 + 15 * (other_lines + i))}, 8 * scale, kCaution);
 
   const std::string greatest =
       stress_is_trusted(estimate) ? "max " + three_digits(greatest_stress_kPa(estimate)) : "max -";

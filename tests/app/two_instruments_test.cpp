@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/feedback/forces_file.h"
+#include "tests/app/program.h"
+
+namespace palpate::test {
+namespace {
+
+constexpr const char* kScene = R"(map: {elements: 1000}
+tissue: {law: neo-hookean, young_modulus_kPa: 400, poisson_ratio: 0.35}
+attachments: [{underside: {depth_mm: 6}}]
+contact: {footprint_radius_mm: 3.5, grip: grasp}
+simulate:
+  body: {shape: pear, size_mm: [62, 48, 44], center_mm: [0, 2, 112], rotation_deg: [-12, 8, -10], elements: 1500}
+  camera: {width: 480, height: 270, focal_px: 350, fps: 12.5}
+  instrument: {enters_from: [130, 25, 20]}
+  gesture: [{approach_s: 0.4, at_px: [280, 135]}, {grasp: true}, {move_mm: [3, 1, 0], during_s: 0.6}, {hold_s: 1},
+            {move_mm: [0.5, 0, 0], during_s: 0.6}, {hold_s: 0.5}, {release: true, leave_s: 0.3}]
+  second:
+    instrument: {enters_from: [-130, 30, 20]}
+    gesture: [{approach_s: 1.1, at_px: [190, 125]}, {grasp: true}, {move_mm: [2.5, -1, 0], during_s: 0.5}, {hold_s: 0.3},
+              {move_mm: [-1.5, 0, 0], during_s: 0.5}, {release: true, leave_s: 0.3}]
+)";
+
+/// What a robot would write of the tip whose truth is known.
+void write_track(const std::filesystem::path& truth, const std::filesystem::path& track) {
+  std::string text = "frame,time_s,x_mm,y_mm,z_mm,closed\n";
+  for (const ForceRow& row : read_truth(truth))
+    text += std::to_string(row.frame) + "," + std::to_string(row.time_s) + "," + std::to_string(row.tip_mm.x()) + "," +
+            std::to_string(row.tip_mm.y()) + "," + std::to_string(row.tip_mm.z()) + "," + (row.in_contact ? "1" : "0") +
+            "\n";
+  write_file(track, text);
+}
+
+TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
+  const Workspace workspace;
+  write_file(workspace / "two.yaml", kScene);
+  const Outcome made =
+      run_palpate("simulate " + (workspace / "two.yaml").string() + " -o " + (workspace / "in").string());
+  ASSERT_EQ(made.exit_code, 0) << made.error;
+  write_track(workspace / "in/truth.csv", workspace / "in/tip.csv");
+  write_track(workspace / "in/truth_2.csv", workspace / "in/tip_2.csv");
+  replace_in_file(workspace / "in/scene.yaml", "instrument:\n",
+                  "instrument:\n  track: tip.csv\n  track_2: tip_2.csv\n");
+  const Outcome outcome =
+      run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string() +
+                  " --json --truth " + (workspace / "in/truth.csv").string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  const auto json = nlohmann::json::parse(outcome.output);
+  for (const char* name : {"comparison", "comparison_2"}) {
+    const auto& figures = json[name];
+    EXPECT_GT(figures["true_peak_N"].get<double>(), 3) << name;
+    EXPECT_LT(figures["force_nrmse_pct"].get<double>(), 12) << name;
+    EXPECT_LT(figures["direction_error_deg_median"].get<double>(), 5) << name;
+    EXPECT_EQ(figures["onset_error_frames"].get<int>(), 0) << name;
+    EXPECT_EQ(figures["release_error_frames"].get<int>(), 0) << name;
+    EXPECT_EQ(figures["missing_frames"].get<int>(), 0) << name;
+  }
+  // While the first stands still, the second one's pull is felt in it.
+  const std::vector<ForceRow> truth = read_truth(workspace / "in/truth.csv"),
+                              found = read_forces(workspace / "out/forces.csv");
+  const size_t before = 13, after = 21;
+  const Vec3 true_change_N = truth[after].force_N - truth[before].force_N;
+  ASSERT_EQ(truth[after].tip_mm, truth[before].tip_mm);
+  EXPECT_GT(true_change_N.norm(), 0.05);
+  const Vec3 change_N = found[after].force_N - found[before].force_N;
+  const double share = change_N.dot(true_change_N) / true_change_N.squaredNorm();
+  EXPECT_GT(share, 0.5);
+  EXPECT_LT(share, 2) << "through a body that is known by its front and its thickness";
+  // When the second lets go, the first one's force does not jump.
+  for (size_t frame = 28; frame < 33; ++frame)
+    EXPECT_LT((found[frame].force_N - truth[frame].force_N).norm(), 0.16 * truth[frame].force_N.norm()) << frame;
+}
+
+}  // namespace
+}  // namespace palpate::test
