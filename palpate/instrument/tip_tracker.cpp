@@ -11,7 +11,7 @@ constexpr double kGoodAgreement = 0.6;        // below, a keyframe has become to
 constexpr double kLeastAgreementAlone = 0.5;  // for a frame in which the mask gives no tip
 constexpr double kKeyframeReach_px = 40;      // motion after which a fresh keyframe is better
 constexpr int kMostFramesAlone = 5;           // without any tip from the masks
-constexpr int kMostFramesTouching = 100;      // the same beside another instrument, where none can be expected
+constexpr int kMostFramesTrusted = 100;       // the same where the texture has to be trusted for longer
 constexpr int kMostRejected = 3;              // detections outside the gate before the filter starts anew
 constexpr double kThinnest_mm = 0.8;          // shaft of an instrument
 constexpr double kThickest_mm = 25;
@@ -87,8 +87,11 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
   std::optional<Detection> detection = detect(left, right);
   const auto measured = motion_since_keyframe(left, right, detection, seconds);
   frames_alone_ = detection ? 0 : frames_alone_ + 1;
+  // Beside another instrument no tip can be expected from the masks; a held one lies in the tissue, which hides its
+  // end, and its contact hangs on it.
+  const bool trusted = touches_another || (marked_ && measured && measured->agreement > kGoodAgreement);
   const bool followed = measured && filter_.started() &&
-                        frames_alone_ <= (touches_another ? kMostFramesTouching : kMostFramesAlone) &&
+                        frames_alone_ <= (trusted ? kMostFramesTrusted : kMostFramesAlone) &&
                         (detection || measured->agreement > kLeastAgreementAlone);
   TipObservation observation;
   if (!detection && !followed) {

@@ -54,6 +54,45 @@ TEST(InstrumentTracker, MeasuresTheDisplacementSinceTheMarkMuchBetterThanTheTip)
   EXPECT_FALSE(tracker.update(test::draw_pair({}, instrument, frame)).tips[0].since_mark_mm);
 }
 
+/// A frame of an instrument on whose shaft a strip of gauze has come to lie, from border to border: the mask of both
+/// together is no instrument any more, while the jaws look as before.
+RectifiedPair draw_with_gauze(const test::DrawnInstrument& instrument, int index) {
+  RectifiedPair pair = test::draw_pair({}, instrument, index);
+  for (cv::Mat* image : {&pair.left, &pair.right})
+    cv::rectangle(*image, cv::Rect(image->cols - 100, 0, 40, image->rows), cv::Scalar::all(180), cv::FILLED);
+  return pair;
+}
+
+TEST(InstrumentTracker, FollowsAHeldInstrumentByItsTextureWhereTheMaskShowsNone) {
+  test::DrawnInstrument instrument;
+  const Vec3 start = instrument.tip_mm;
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  for (int frame = 1; frame < 4; ++frame) tracker.update(test::draw_pair({}, instrument, frame));
+  tracker.mark(0);
+  for (int frame = 4; frame < 14; ++frame) {
+    const Vec3 moved = (frame - 3) * Vec3(-0.1, 0.05, 0.1);
+    instrument.tip_mm = start + moved;
+    const auto seen = tracker.update(draw_with_gauze(instrument, frame)).tips[0];
+    ASSERT_TRUE(seen.visible) << "frame " << frame;
+    ASSERT_TRUE(seen.since_mark_mm) << "frame " << frame;
+    EXPECT_LT((*seen.since_mark_mm - moved).norm(), 0.3) << "frame " << frame;
+  }
+  int last_seen = 0;
+  for (int frame = 14; frame < 20; ++frame)
+    if (tracker.update(test::draw_pair({.instrument = false}, {}, frame)).tips[0].visible) last_seen = frame;
+  EXPECT_LT(last_seen, 19);
+}
+
+TEST(InstrumentTracker, LosesAFreeInstrumentWhoseMaskIsGone) {
+  const test::DrawnInstrument instrument;
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  for (int frame = 1; frame < 4; ++frame) tracker.update(test::draw_pair({}, instrument, frame));
+  int last_seen = 0;
+  for (int frame = 4; frame < 12; ++frame)
+    if (tracker.update(draw_with_gauze(instrument, frame)).tips[0].visible) last_seen = frame;
+  EXPECT_LT(last_seen, 9);
+}
+
 TEST(InstrumentTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
   const test::DrawnInstrument instrument;
   InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
