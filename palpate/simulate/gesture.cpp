@@ -154,7 +154,8 @@ GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s) {
       case Action::hold:
         break;
       case Action::release:
-        pose.in_contact = false;
+        // The picture of the first moment is still that of the hold.
+        pose.in_contact &= length_s > 0 && time_s <= start_s + kSameMoment_s;
         pose.away = progress;
         break;
     }

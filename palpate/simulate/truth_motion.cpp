@@ -100,6 +100,12 @@ void fill_row(TruthRow& row, int field, int fields, double fps, const SimulatedC
                 inside(camera, project(camera, tip_mm, camera.baseline_mm));
 }
 
+// The touch point on the boundary of the true body: the drawn organ is finer, and may lie above it or below.
+TouchPoint on_body(const TruthBody& body, TouchPoint touch) {
+  touch.point_mm = closest_point(touch.point_mm, body.mesh.nodes_mm, body.boundary).point;
+  return touch;
+}
+
 void check_equilibrium(const Equilibrium& equilibrium, double time_s, const Vec3& move_mm, MotionQuality& quality) {
   if (!equilibrium.converged)
     throw BadInput(
@@ -153,7 +159,7 @@ std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOpt
   precise.relative_residual = kTruthResidual;
   const TouchPoint& touch = touches.at(0);
   HeldTissue grasped(model, truth, precise);
-  PushedTissue pushed(model, truth, touch, friction, precise);
+  PushedTissue pushed(model, truth, on_body(truth, touch), friction, precise);
   const bool push = is_push(options.gesture);
   const int fields = options.look.interlace ? 2 : 1;
   SecondTip second;

@@ -50,13 +50,18 @@ TEST(Gesture, ReachesTheStatedPlacesAtRowEnds) {
   EXPECT_NEAR(gesture_at(rows, 9).away, 1, 1e-12);
 }
 
-TEST(Gesture, BeginsTheContactWithoutDisplacementAndEndsItAtTheRelease) {
+TEST(Gesture, BeginsTheContactWithoutDisplacementAndEndsItWhenTheReleaseShows) {
   const auto rows = read(kGesture).gesture;
   EXPECT_FALSE(gesture_at(rows, 0.6 - 1e-6).in_contact);
   EXPECT_TRUE(gesture_at(rows, 0.6).in_contact);
   EXPECT_LT(gesture_at(rows, 0.6).move_mm.norm(), 1e-12);
-  EXPECT_TRUE(gesture_at(rows, 2.0 - 1e-6).in_contact);
-  EXPECT_FALSE(gesture_at(rows, 2.0).in_contact);
+  const GesturePose last = gesture_at(rows, 2.0), next = gesture_at(rows, 2.04);
+  EXPECT_TRUE(last.in_contact);
+  EXPECT_NEAR(last.opening, 0, 1e-12);
+  EXPECT_NEAR(last.away, 0, 1e-12);
+  EXPECT_FALSE(next.in_contact);
+  EXPECT_GT(next.opening, 0);
+  EXPECT_GT(next.away, 0);
 }
 
 TEST(Gesture, TouchesOnTheFrameThatTheRowsName) {
