@@ -15,6 +15,7 @@ namespace {
 enum class Action { approach, grasp, push, move, hold, release };
 
 const double kJaws_s = 0.16;        // time in which the jaws open or close
+const double kStillClosed = 0.02;   // opening up to which the jaws hold: less than a tenth of a pixel shows
 const double kSameMoment_s = 1e-9;  // times of frames and rows agree up to rounding
 
 std::vector<Action> actions_of(const GestureRow& row) {
@@ -154,8 +155,7 @@ GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s) {
       case Action::hold:
         break;
       case Action::release:
-        // The picture of the first moment is still that of the hold.
-        pose.in_contact &= length_s > 0 && time_s <= start_s + kSameMoment_s;
+        pose.in_contact &= length_s > 0 && minimum_jerk((time_s - start_s) / kJaws_s) < kStillClosed;
         pose.away = progress;
         break;
     }

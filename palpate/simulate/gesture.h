@@ -22,8 +22,8 @@ void check_gesture(const std::vector<GestureRow>& rows);
 double gesture_duration_s(const std::vector<GestureRow>& rows);
 
 /// Pose at a time from the start. Minimum jerk within each row (rest to rest), so that positions, velocities and
-/// accelerations are continuous over row ends. The contact begins at its moment and lasts as long as nothing of the
-/// release shows: through its first moment.
+/// accelerations are continuous over row ends. The contact begins at its moment and lasts until the release shows:
+/// through the first moments of it, in which neither jaws nor tip have moved visibly.
 GesturePose gesture_at(const std::vector<GestureRow>& rows, double time_s);
 
 /// The tip is not tied to the tissue.
