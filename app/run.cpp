@@ -175,6 +175,19 @@ struct RunFiles {
   }
 };
 
+FrameTimes median_stages(const std::vector<FrameTimes>& times, const std::vector<ForceRow>& rows) {
+  const bool any_contact = std::any_of(rows.begin(), rows.end(), [](const ForceRow& row) { return row.in_contact; });
+  FrameTimes medians;
+  for (double FrameTimes::*stage : {&FrameTimes::rectify_ms, &FrameTimes::track_ms, &FrameTimes::contact_ms,
+                                    &FrameTimes::solve_ms, &FrameTimes::stress_ms, &FrameTimes::draw_ms}) {
+    std::vector<double> of_stage;
+    for (size_t i = 0; i < times.size(); ++i)
+      if (rows[i].in_contact || !any_contact) of_stage.push_back(times[i].*stage);
+    medians.*stage = quantile(of_stage, 0.5);
+  }
+  return medians;
+}
+
 RunSummary summary_of(const RunFiles& files, double map_s) {
   RunSummary summary;
   summary.folder = files.options.folder;
@@ -186,6 +199,7 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   for (const FrameTimes& times : files.times) frame_ms.push_back(times.total_ms());
   summary.median_frame_ms = quantile(frame_ms, 0.5);
   summary.p99_frame_ms = quantile(frame_ms, 0.99);
+  summary.stages = median_stages(files.times, files.rows);
   for (const ForceRow& row : files.rows) {
     summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);
     ++summary.frames_by_status[row.status];
@@ -351,6 +365,11 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["map_s"] = summary.map_s;
   json["median_frame_ms"] = summary.median_frame_ms;
   json["p99_frame_ms"] = summary.p99_frame_ms;
+  json["frames_per_second"] = summary.median_frame_ms > 0 ? 1000 / summary.median_frame_ms : 0;
+  json["stage_track_ms"] = summary.stages.track_ms;
+  json["stage_solve_ms"] = summary.stages.solve_ms;
+  json["stage_stress_ms"] = summary.stages.stress_ms;
+  json["stage_draw_ms"] = summary.stages.draw_ms;
   json["tissue"] = tissue_json(summary.tissue);
   json["peak_force_N"] = summary.peak_force_N;
   json["peak_force_per_modulus_N_per_kPa"] = force_per_modulus_N_per_kPa(summary);

@@ -25,6 +25,7 @@ struct RunSummary {
   double map_s = 0;
   double median_frame_ms = 0;
   double p99_frame_ms = 0;
+  FrameTimes stages;  ///< median of each, of the frames in contact where there are any
   double peak_force_N = 0;
   std::map<std::string, int> frames_by_status;
   std::map<std::string, int> frames_by_warning;

@@ -25,8 +25,17 @@ const std::vector<std::pair<const char*, const char*>> kSweepColumns = {
     {"coverage_pct", "depth measured, %"},
     {"map_s", "map, s"},
     {"median_frame_ms", "frame, ms"},
+    {"stage_track_ms", "instrument, ms"},
+    {"stage_solve_ms", "equilibrium, ms"},
+    {"stage_draw_ms", "overlay, ms"},
+    {"frames_per_second", "frames per second"},
     {"statuses", "frames"},
 };
+
+/// Tables about other things leave out where the time of a frame goes.
+bool is_of_time(const std::string& column) {
+  return column.starts_with("stage_") || column == "frames_per_second";
+}
 
 std::string text(const Json& value) {
   return value.is_string() ? value.get<std::string>() : "";
@@ -70,7 +79,7 @@ std::string goal_table(const Json& experiment, const Json& run, const Json& colu
     const std::string name = column["name"];
     const Json& value = run["figures"][name];
     const bool has_goal = experiment["goals"].contains(name);
-    if (value.is_null() && !has_goal) continue;
+    if ((value.is_null() || is_of_time(name)) && !has_goal) continue;
     const double goal = has_goal ? experiment["goals"][name].get<double>() : 0;
     table += fmt::format("| {} | {} | {} |\n", text(column["title"]), has_goal ? fmt::format("≤ {:g}", goal) : "",
                          !has_goal             ? short_number(value)
@@ -89,9 +98,10 @@ std::string warnings_text(const Json& run) {
 
 std::string sweep_table(const Json& experiment) {
   std::vector<std::pair<const char*, const char*>> shown;
+  const bool about_time = experiment["key"] == "map.elements";
   for (const auto& column : kSweepColumns)
     for (const Json& run : experiment["runs"])
-      if (!run["figures"][column.first].is_null()) {
+      if (!run["figures"][column.first].is_null() && (about_time || !is_of_time(column.first))) {
         shown.push_back(column);
         break;
       }

@@ -59,7 +59,8 @@ function chart(parent, title, x, y, sets, logX, logY) {
 }
 
 function table(parent, experiment) {
-  const shown = data.columns.filter(c => experiment.runs.some(r => r.figures[c.name] !== null));
+  const shown = data.columns.filter(c => experiment.runs.some(r => r.figures[c.name] !== null) &&
+    (experiment.key === 'map.elements' || !/^stage_|^frames_per_second/.test(c.name)));
   const node = add(add(parent, 'div', undefined, 'table'), 'table');
   const head = add(add(node, 'thead'), 'tr');
   add(head, 'th', experiment.key ? experiment.key + (experiment.unit ? ', ' + experiment.unit : '') : 'run');

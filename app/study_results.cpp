@@ -43,6 +43,11 @@ const std::vector<std::pair<std::string, std::string>> kColumns = {
     {"map_s", "map, s"},
     {"median_frame_ms", "frame, ms median"},
     {"p99_frame_ms", "frame, ms 99 %"},
+    {"stage_track_ms", "of it in contact: instrument, ms"},
+    {"stage_solve_ms", "equilibrium, ms"},
+    {"stage_stress_ms", "stress, ms"},
+    {"stage_draw_ms", "overlay, ms"},
+    {"frames_per_second", "frames per second"},
     {"statuses", "frames"},
 };
 
