@@ -23,6 +23,9 @@ constexpr double kPointDeviation_mm = 0.05;
 constexpr double kPointsThatAgree = 6;
 constexpr double kAway_mm = 0.6, kAwayUntold_mm = 1.5;
 constexpr int kFewestFollowingPoints = 6;
+/// A tip in the tissue that has risen by this in the last frames retreats; less may be noise of its depth.
+constexpr double kRetreat_mm = 0.4;
+constexpr size_t kRecentFrames = 4;
 /// A tip that has come to rest does not go on like this in the first frames of a contact without the tissue.
 constexpr int kSettlingFrames = 4;
 constexpr double kUnsettledStep_mm = 0.3;
@@ -143,11 +146,18 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   const Follow follow = compare_motion(seen, believed.predicted_mm);
   const bool unsettled = is_unsettled(displacement_mm, if_held_, believed.answer.let_go ? if_held_ : follow);
   last_displacement_mm_ = displacement_mm;
-  bool let_go = has_to_be_seen && follow.points < kFewestFollowingPoints;
+  bool let_go = false;
   if (judge_.grip() == Grip::grasp)
-    let_go |= follow.let_go | release_.update(result.tip_mm, seen, believed.predicted_mm);
+    let_go = follow.let_go | release_.update(result.tip_mm, seen, believed.predicted_mm);
   else if (pushes_ && !believed.answer.let_go)
-    let_go |= follow.let_go && follow.share < kLeastPushedShare;
+    let_go = follow.let_go && follow.share < kLeastPushedShare;
+  // Tissue cannot stay behind a tip that stays in it, whatever a law that gives way there predicts.
+  recent_heights_mm_.push_back(height_mm);
+  if (recent_heights_mm_.size() > kRecentFrames) recent_heights_mm_.pop_front();
+  const double deepest_mm = *std::min_element(recent_heights_mm_.begin(), recent_heights_mm_.end());
+  const bool stays_in_it = height_mm < -kPressed_mm && height_mm - deepest_mm < kRetreat_mm;
+  if (stays_in_it && asked_for_ == Grip::grasp) let_go = false;
+  let_go |= has_to_be_seen && follow.points < kFewestFollowingPoints;
   // A tip that loses hold of the tissue while it presses on it slides: what held it so far was friction.
   if (let_go && judge_.grip() == Grip::grasp && asked_for_ == Grip::automatic && height_mm < -kPressed_mm) {
     judge_.start(Grip::push);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <map>
 #include <optional>
 
@@ -70,6 +71,7 @@ class TipContact {
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;
+  std::deque<double> recent_heights_mm_;
   double held_friction_ = 0;  // what the grasp of the last frame would take from a push
   Follow if_held_;            // how the tissue follows if the tip holds it; where that was asked for in this frame
 };

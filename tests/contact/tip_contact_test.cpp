@@ -173,6 +173,13 @@ TEST(TipContact, ATipThatRetreatsAndLeavesTheTissueHasLetGo) {
   }
 }
 
+TEST(TipContact, AGraspThatGoesOnIntoTheTissueHasNotLetGo) {
+  Scene scene(Grip::grasp, Grip::grasp);
+  for (int i = 0; i <= 10; ++i) ASSERT_EQ(scene.move({0.05 * i, 0, 0.15 * i}).state, State::touching);
+  for (int i = 1; i <= 5; ++i)
+    EXPECT_EQ(scene.move_alone({0.5 + 0.3 * i, 0, 1.5 + 0.02 * i}).state, State::touching) << i;
+}
+
 TEST(TipContact, ATipThatTremblesOnTheSurfaceKeepsTouching) {
   for (const Grip told : {Grip::automatic, Grip::push, Grip::grasp}) {
     Scene scene(Grip::push, told);
