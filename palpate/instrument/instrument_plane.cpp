@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "palpate/stereo/seeds.h"
+
 namespace palpate {
 
 namespace {
@@ -13,8 +15,12 @@ using Matrix4 = Eigen::Matrix4d;
 // The outline lies in the plane of the axis whatever the shape of the instrument; how far the surface stands out of it
 // is only a guess, so the texture has little to say here.
 constexpr LayerNoise kNoise{30, 24};
-constexpr double kSlopeDeviation = 0.05;  // px/px; a shaft that halves its depth over the image has 0.05
-constexpr double kRowDeviation_px = 0.5;  // left by a good calibration
+constexpr double kSlopeDeviation = 0.05;  // px/px along the axis; a shaft that halves its depth over the image has 0.05
+constexpr double kSlopeAcross = 0.01;     // the outline of a round shaft lies square to the line of sight
+constexpr double kSlopeChange = 0.003;    // from frame to frame
+constexpr double kRowFloor_px = 0.06;     // of an outline, which light moves differently in both eyes
+constexpr size_t kFewestMatches = 60;
+constexpr double kLeastDisparity_px = 2, kMostDisparity_px = 200;
 constexpr double kLeastAgreement = 0.35;
 constexpr double kCorrelatedNoise = 12;  // pixels that share one noise sample after smoothing and video coding
 
@@ -72,34 +78,59 @@ double search_disparity(const Problem& problem, double guess) {
   return best;
 }
 
+/// What is known of slopes and row offset without the picture; nothing of the disparity itself.
+struct Expected {
+  Vector4 mean = Vector4::Zero();
+  Matrix4 information = Matrix4::Zero();
+};
+
+Expected expected_plane(const ImageTip& tip, const PlanePrior& prior) {
+  const Eigen::Vector2d along(tip.axis.x, tip.axis.y), across(-tip.axis.y, tip.axis.x);
+  const double along_deviation = prior.before ? kSlopeChange : kSlopeDeviation;
+  Expected expected;
+  expected.information.block<2, 2>(1, 1) = along * along.transpose() / std::pow(along_deviation, 2) +
+                                           across * across.transpose() / std::pow(kSlopeAcross, 2);
+  if (prior.before) expected.mean.segment<2>(1) = along.dot(prior.before->disparity.tail<2>()) * along;
+  expected.information(3, 3) = 1 / std::pow(prior.rows.deviation_px, 2);
+  expected.mean[3] = prior.rows.px;
+  return expected;
+}
+
 }  // namespace
 
-std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const cv::Point2d& tip_px,
-                                                const ImageLayers& right, double guess_px, double focal_px) {
-  const Problem problem{left, tip_px, right, focal_px};
-  Vector4 p(search_disparity(problem, guess_px), 0, 0, 0);
-  Matrix4 prior = Matrix4::Zero();
+RowOffset measure_row_offset(const cv::Mat& left_bgr, const cv::Mat& right_bgr) {
+  const cv::Mat everywhere(left_bgr.size(), CV_8U, cv::Scalar(255));
+  const Seeds seeds = find_seeds(prepare_eyes(left_bgr, right_bgr, everywhere), kLeastDisparity_px, kMostDisparity_px);
+  if (seeds.matches.size() < kFewestMatches) return {};
+  return {seeds.row_offset_px, std::hypot(kRowFloor_px, seeds.calibration_deviation_px)};
+}
+
+std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const ImageTip& tip,
+                                                const ImageLayers& right, double focal_px, const PlanePrior& prior) {
+  const Problem problem{left, tip.tip_px, right, focal_px};
+  const Expected expected = expected_plane(tip, prior);
+  const Matrix4 expected_normal = kCorrelatedNoise * expected.information;
+  Vector4 p = expected.mean;
+  p[0] = search_disparity(problem, prior.disparity_px);
   System system;
   for (int level = ImageLayers::kLevels - 1; level >= 0; --level) {
     for (int pass = 0; pass < 8; ++pass) {
       system = assemble(problem, level, p);
-      prior.diagonal() << 0, 1 / std::pow(kSlopeDeviation, 2), 1 / std::pow(kSlopeDeviation, 2),
-          1 / std::pow(kRowDeviation_px, 2);
-      prior *= kCorrelatedNoise;
-      const Matrix4 normal = system.normal + prior + 1e-6 * Matrix4::Identity();
-      const Vector4 step = normal.ldlt().solve(system.right - prior * p);
+      const Matrix4 normal = system.normal + expected_normal + 1e-6 * Matrix4::Identity();
+      const Vector4 step = normal.ldlt().solve(system.right - expected_normal * (p - expected.mean));
       p += step;
       if (std::abs(step[0]) < 0.003 && std::abs(step[3]) < 0.003) break;
     }
   }
   if (system.agreement() < kLeastAgreement || !(p[0] > 0.5)) return {};
   InstrumentPlane plane;
-  plane.origin_px = tip_px;
+  plane.origin_px = tip.tip_px;
   plane.disparity = p.head<3>();
   plane.row_offset_px = p[3];
   plane.agreement = system.agreement();
   const double noise = std::max(0.1, system.squared_error / std::max(system.weight, 1.0));
-  plane.disparity_deviation_px = std::sqrt(kCorrelatedNoise * noise * (system.normal + prior).inverse()(0, 0));
+  plane.disparity_deviation_px =
+      std::sqrt(kCorrelatedNoise * noise * (system.normal + expected_normal).inverse()(0, 0));
   return plane;
 }
 

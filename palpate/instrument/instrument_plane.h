@@ -20,9 +20,24 @@ struct InstrumentPlane {
   }
 };
 
-/// Aligns the left template with the right image, starting at `guess_px` of disparity at the tip (searched +- 12 px
-/// around). Nothing when too little of it fits.
-std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const cv::Point2d& tip_px,
-                                                const ImageLayers& right, double guess_px, double focal_px);
+/// Right row minus left row of what is the same point, as the calibration leaves it.
+struct RowOffset {
+  double px = 0;
+  double deviation_px = 0.5;  ///< left by a good calibration
+};
+
+/// The row offset of the whole picture, from corners of a static pair; as good as unknown where it has too few.
+RowOffset measure_row_offset(const cv::Mat& left_bgr, const cv::Mat& right_bgr);
+
+/// What is known before the right image is looked at.
+struct PlanePrior {
+  double disparity_px = 0;  ///< at the tip; searched +- 12 px around
+  RowOffset rows;
+  const InstrumentPlane* before = nullptr;  ///< of the last frame, if it had one: the slope changes little
+};
+
+/// Aligns the left template with the right image. Nothing when too little of it fits.
+std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const ImageTip& tip,
+                                                const ImageLayers& right, double focal_px, const PlanePrior& prior);
 
 }  // namespace palpate

@@ -45,6 +45,7 @@ double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& ex
 
 struct InstrumentTracker::State {
   Rectification rectification;
+  RowOffset rows;
   std::array<SegmentationModel, 2> models;
   std::vector<SegmentationNetwork> networks;  ///< one for each eye, or none
   std::vector<TipTrack> tracks;
@@ -180,7 +181,7 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
         if (second_seen + 1 < kBeforeASecondIsBelieved) continue;
       }
       if (!keeps_its_entry(*entry)) {
-        trackers[*entry] = TipTracker(rectification);
+        trackers[*entry] = TipTracker(rectification, rows);
         frames_seen[*entry] = 0;
       }
       seen[0].of_tracker[*entry] = static_cast<int>(l);
@@ -234,7 +235,6 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
                                      const RectifiedPair& static_frame, const cv::Mat& organ_mask)
     : state_(std::make_unique<State>()) {
   state_->rectification = rectification;
-  state_->trackers.assign(kMostInstruments, TipTracker(rectification));
   for (const std::filesystem::path& track : {options.track, options.track_2})
     if (!track.empty()) state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
   state_->time_offset_s = options.time_offset_s;
@@ -242,7 +242,9 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
     for (int eye = 0; eye < 2; ++eye)
       state_->networks.emplace_back(options.segmentation, options.instrument_class, rectification.size);
   tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
-                       [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); });
+                       [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); },
+                       [&] { state_->rows = measure_row_offset(static_frame.left, static_frame.right); });
+  state_->trackers.assign(kMostInstruments, TipTracker(rectification, state_->rows));
 }
 
 InstrumentTracker::~InstrumentTracker() = default;

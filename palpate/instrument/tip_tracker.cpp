@@ -16,7 +16,9 @@ constexpr int kMostRejected = 3;              // detections outside the gate bef
 constexpr double kThinnest_mm = 0.8;          // shaft of an instrument
 constexpr double kThickest_mm = 25;
 constexpr double kTipDeviation_px = 0.7;  // where the mask ends against where the jaws end
-constexpr double kDisparityFloor_px = 0.05;
+constexpr double kDisparityFloor_px = 0.2;
+constexpr double kUnfit_px = 1.5;  // of disparity, for a template of which nothing fits any more
+constexpr double kClearlyBetterFit = 0.1;
 constexpr double kBias_mm = 0.25;  // what does not average out over frames: outline, one side of the jaws seen
 constexpr double kMotionFloor_mm = 0.02;
 constexpr double kMotionModelShare = 0.04;  // of a displacement: light that does not move along, depths of the template
@@ -28,6 +30,11 @@ double followed_length_px(const ImageTip& tip) {
 Vec3 rectified_point(const Rectification& r, const cv::Point2d& left_px, double disparity) {
   const double z = r.depth_mm(disparity);
   return {(left_px.x - r.principal_x_px) * z / r.focal_px, (left_px.y - r.principal_y_px) * z / r.focal_px, z};
+}
+
+/// Depth that a pixel of disparity makes.
+double depth_per_px(const Rectification& r, double z_mm) {
+  return z_mm * z_mm / (r.focal_px * r.baseline_mm);
 }
 
 cv::Point2d left_pixel(const Rectification& r, const Vec3& p) {
@@ -64,7 +71,8 @@ std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, con
   const double guess = left.tip->tip_px.x - right.tip->tip_px.x;
   Detection detection;
   detection.left_template = make_template(left.layers, left.mask, *left.tip, followed_length_px(*left.tip));
-  const auto plane = match_instrument(detection.left_template, left.tip->tip_px, right.layers, guess, r.focal_px);
+  const PlanePrior prior{guess, rows_, last_plane_ ? &*last_plane_ : nullptr};
+  const auto plane = match_instrument(detection.left_template, *left.tip, right.layers, r.focal_px, prior);
   if (!plane) return {};
   // Both masks end at the same tip: the match of the whole far part must not contradict them.
   if (std::abs(plane->disparity[0] - guess) > 4 + 0.1 * left.tip->width_px) return {};
@@ -74,8 +82,7 @@ std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, con
   detection.tip_mm = rectified_point(r, left.tip->tip_px, plane->disparity[0]);
   const double z = detection.tip_mm.z();
   const double across = kTipDeviation_px * z / r.focal_px;
-  const double along =
-      z * z / (r.focal_px * r.baseline_mm) * std::max(plane->disparity_deviation_px, kDisparityFloor_px);
+  const double along = depth_per_px(r, z) * std::max(plane->disparity_deviation_px, kDisparityFloor_px);
   const Vec3 ray = detection.tip_mm / z;  // an error of depth moves the point along its viewing ray
   detection.covariance_mm2 = across * across * Mat3::Identity() + along * along * ray * ray.transpose();
   return detection;
@@ -103,6 +110,7 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
   visible_ = true;
 
   if (detection) {
+    last_plane_ = detection->plane;
     eye_lag_.add(index, left.tip->tip_px.y, right.tip->tip_px.y);
     eyes_out_of_step_ = eye_lag_.frames().value_or(eyes_out_of_step_ ? 1 : 0) != 0;
   }
@@ -157,14 +165,21 @@ std::optional<RigidMotion> TipTracker::motion_since_keyframe(const EyeView& left
   return best;
 }
 
+/// Of the motion from one frame to the next. What the template no longer resembles misleads above all in depth.
+Mat3 TipTracker::step_covariance(const RigidMotion& motion) const {
+  const Vec3 ray = filter_.position_mm() / filter_.position_mm().z();
+  const double along_mm = kUnfit_px * (1 - motion.agreement) * depth_per_px(rectification_, filter_.position_mm().z());
+  return motion.covariance_mm2 + kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity() +
+         along_mm * along_mm * ray * ray.transpose();
+}
+
 void TipTracker::advance(const std::optional<RigidMotion>& measured, bool followed,
                          const std::optional<Detection>& detection, double seconds) {
   const TipFilter before = filter_;
   std::optional<RigidMotion> taken = measured;
   const auto corrected = [&] { return filter_.correct(detection->tip_mm, detection->covariance_mm2); };
   if (followed) {
-    const Mat3 floor = kMotionFloor_mm * kMotionFloor_mm * Mat3::Identity();
-    filter_.move(measured->translation_mm - motion_.translation_mm, measured->covariance_mm2 + floor, seconds);
+    filter_.move(measured->translation_mm - motion_.translation_mm, step_covariance(*measured), seconds);
   } else if (filter_.started()) {
     filter_.predict(seconds);
   }
@@ -174,8 +189,8 @@ void TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
   } else if (detection && corrected()) {
     rejected_ = 0;
   } else if (detection) {
-    // Motion and detection contradict each other: the one that continues the path so far is right, or comes nearer to
-    // it; a marked template, which the contact hangs on, has proved itself.
+    // Motion and detection contradict each other: the one that clearly fits better is right, or that continues the path
+    // so far, or comes nearer to it; a marked template, which the contact hangs on, has proved itself.
     const TipFilter as_followed = filter_;
     filter_ = before;
     filter_.predict(seconds);
@@ -183,7 +198,8 @@ void TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
     const bool is_nearer =
         (detection->tip_mm - predicted_mm).norm() < (as_followed.position_mm() - predicted_mm).norm();
     const bool continues = corrected();
-    if (followed && !marked_ && (continues || is_nearer)) {
+    const bool fits_better = followed && detection->plane.agreement > measured->agreement + kClearlyBetterFit;
+    if (followed && !marked_ && (continues || is_nearer || fits_better)) {
       if (!continues) filter_.start(detection->tip_mm, detection->covariance_mm2);
       taken.reset();
       rejected_ = 0;
@@ -226,6 +242,7 @@ void TipTracker::use_fresh_keyframe() {
 void TipTracker::lose() {
   visible_ = false;
   filter_.stop();
+  last_plane_.reset();
   if (!marked_) keyframe_.reset();
   fresh_keyframe_.reset();
   frames_alone_ = rejected_ = 0;

@@ -28,7 +28,7 @@ bool can_be_one_tip(const ImageTip& left, const ImageTip& right);
 /// triangulation, Kalman filter.
 class TipTracker {
  public:
-  explicit TipTracker(const Rectification& rectification) : rectification_(rectification) {}
+  TipTracker(const Rectification& rectification, const RowOffset& rows) : rectification_(rectification), rows_(rows) {}
 
   /// `seconds` since the last frame, `index` of this one. `touches_another`: the masks do not tell where this one ends,
   /// so that its texture has to be trusted for longer.
@@ -54,6 +54,7 @@ class TipTracker {
   std::optional<Detection> detect(const EyeView& left, const EyeView& right) const;
   std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
                                                    const std::optional<Detection>& detection, double seconds) const;
+  Mat3 step_covariance(const RigidMotion& motion) const;
   void advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
                double seconds);
   void renew_keyframe(std::optional<Detection> detection, const EyeView& right);
@@ -62,10 +63,12 @@ class TipTracker {
   void report_since_mark(TipObservation& observation) const;
 
   Rectification rectification_;
+  RowOffset rows_;
   TipFilter filter_;
   EyeLag eye_lag_;
   bool eyes_out_of_step_ = false;                     // as last found; it stays so while nothing moves
   std::array<std::optional<ImageTip>, 2> last_tips_;  // where to look when a mask shows none
+  std::optional<InstrumentPlane> last_plane_;         // of the last detection
   std::optional<InstrumentKeyframe> keyframe_;
   std::optional<InstrumentKeyframe> fresh_keyframe_;  // of the last frame, should it be marked
   RigidMotion motion_;                                // since the keyframe, as last measured
