@@ -1,6 +1,6 @@
 #include "palpate/instrument/eye_lag.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -9,10 +9,10 @@ namespace palpate {
 namespace {
 
 constexpr size_t kFrames = 12;
-/// RMS motion of the tip from frame to frame that stands out of what the masks' ends jitter.
-constexpr double kLeastMotion_px = 1.5;
-/// The rows have to agree so much better with one eye moved, as a ratio of sums of squares.
-constexpr double kClearlyBetter = 0.3;
+constexpr double kLeastMotion_px = 0.55;  // deviation of the motion from frame to frame, below which nothing can be told
+constexpr double kSignificant = 5;       // deviations of the slope
+constexpr double kLeastSlope = 0.6, kMostSlope = 1.6;  // of rows over motion, for one frame
+constexpr double kNoLag = 0.4;
 
 }  // namespace
 
@@ -25,23 +25,23 @@ void EyeLag::add(int index, double left_row_px, double right_row_px) {
 
 std::optional<int> EyeLag::frames() const {
   if (recent_.size() < kFrames) return {};
-  std::array<double, 3> disagreement{};  // right eye ahead by -1, 0, 1
-  double motion = 0;
+  // A right eye that is ahead by a frame sees the tip one frame's motion further: the difference of the rows is a line
+  // over the motion, of slope -1. What is the same in all frames is the calibration's, not time's.
   const auto n = static_cast<double>(kFrames - 2);
-  for (size_t lag = 0; lag < 3; ++lag) {
-    double sum = 0, squares = 0;  // a constant offset of the rows is the calibration's, not time's
-    for (size_t t = 1; t + 1 < kFrames; ++t) {
-      const double difference = recent_[t].left_px - recent_[t + 1 - lag].right_px;
-      sum += difference;
-      squares += difference * difference;
-    }
-    disagreement[lag] = squares - sum * sum / n;
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (size_t t = 1; t + 1 < kFrames; ++t) {
+    const double motion = 0.5 * (recent_[t + 1].left_px - recent_[t - 1].left_px);
+    const double difference = recent_[t].left_px - recent_[t].right_px;
+    x += motion, y += difference;
+    xx += motion * motion, xy += motion * difference, yy += difference * difference;
   }
-  for (size_t t = 1; t < kFrames; ++t) motion += std::pow(recent_[t].left_px - recent_[t - 1].left_px, 2);
-  if (motion < (n + 1) * kLeastMotion_px * kLeastMotion_px) return {};
-  for (const int lag : {-1, 1})
-    if (disagreement[static_cast<size_t>(lag + 1)] < kClearlyBetter * disagreement[1]) return lag;
-  return 0;
+  xx -= x * x / n, xy -= x * y / n, yy -= y * y / n;
+  if (xx < n * kLeastMotion_px * kLeastMotion_px) return {};
+  const double slope = xy / xx, unexplained = std::max(yy - slope * xy, 0.0);
+  const double deviation = std::sqrt(unexplained / (n - 2) / xx);
+  if (std::abs(slope) < kNoLag) return 0;
+  if (std::abs(slope) < std::max(kLeastSlope, kSignificant * deviation) || std::abs(slope) > kMostSlope) return {};
+  return slope < 0 ? 1 : -1;
 }
 
 }  // namespace palpate
