@@ -106,7 +106,10 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
     return observation;
   }
 
-  advance(measured, followed, detection, seconds);
+  if (!advance(measured, followed, detection, seconds)) {
+    lose();
+    return observation;
+  }
   visible_ = true;
 
   if (detection) {
@@ -173,7 +176,8 @@ Mat3 TipTracker::step_covariance(const RigidMotion& motion) const {
          along_mm * along_mm * ray * ray.transpose();
 }
 
-void TipTracker::advance(const std::optional<RigidMotion>& measured, bool followed,
+/// False when nothing says where the tip is: it is not where it was going, and no motion confirms that it turned.
+bool TipTracker::advance(const std::optional<RigidMotion>& measured, bool followed,
                          const std::optional<Detection>& detection, double seconds) {
   const TipFilter before = filter_;
   std::optional<RigidMotion> taken = measured;
@@ -183,7 +187,9 @@ void TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
   } else if (filter_.started()) {
     filter_.predict(seconds);
   }
-  if (detection && (!filter_.started() || rejected_ >= kMostRejected)) {
+  // A held tip hides in the tissue, and its mask then ends wherever the tissue begins.
+  const bool held = followed && marked_ && measured->agreement > kGoodAgreement;
+  if (detection && (!filter_.started() || (rejected_ >= kMostRejected && !held))) {
     filter_.start(detection->tip_mm, detection->covariance_mm2);
     rejected_ = 0;
   } else if (detection && corrected()) {
@@ -203,6 +209,8 @@ void TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
       if (!continues) filter_.start(detection->tip_mm, detection->covariance_mm2);
       taken.reset();
       rejected_ = 0;
+    } else if (!followed && !marked_) {
+      return false;
     } else {
       filter_ = as_followed;
       ++rejected_;
@@ -212,6 +220,7 @@ void TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
     motion_ = *taken;
   else
     motion_.agreement = 0;
+  return true;
 }
 
 void TipTracker::renew_keyframe(std::optional<Detection> detection, const EyeView& right) {

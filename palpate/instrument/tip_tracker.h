@@ -55,7 +55,7 @@ class TipTracker {
   std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
                                                    const std::optional<Detection>& detection, double seconds) const;
   Mat3 step_covariance(const RigidMotion& motion) const;
-  void advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
+  bool advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
                double seconds);
   void renew_keyframe(std::optional<Detection> detection, const EyeView& right);
   void use_fresh_keyframe();

@@ -83,6 +83,26 @@ TEST(InstrumentTracker, FollowsAHeldInstrumentByItsTextureWhereTheMaskShowsNone)
   EXPECT_LT(last_seen, 19);
 }
 
+TEST(InstrumentTracker, AHeldTipStaysWhereItIsWhenTissueCoversTheEndOfItsMask) {
+  const test::DrawnInstrument instrument;
+  const Rectification rectification = test::drawn_rectification();
+  InstrumentTracker tracker({}, rectification, test::draw_pair({.instrument = false}, {}, 0), {});
+  for (int frame = 1; frame < 4; ++frame) tracker.update(test::draw_pair({}, instrument, frame));
+  tracker.mark(0);
+  for (int frame = 4; frame < 12; ++frame) {
+    RectifiedPair pair = test::draw_pair({}, instrument, frame);
+    const cv::Point2d at = project_to_rectified(rectification, instrument.tip_mm);
+    const cv::Point2d in_right = at - cv::Point2d(rectification.disparity_px(instrument.tip_mm.z()), 0);
+    cv::circle(pair.left, at, 18, cv::Scalar(48, 52, 135), cv::FILLED);
+    cv::circle(pair.right, in_right, 18, cv::Scalar(48, 52, 135), cv::FILLED);
+    const auto seen = tracker.update(pair).tips[0];
+    ASSERT_TRUE(seen.visible) << "frame " << frame;
+    EXPECT_LT((seen.tip_mm - instrument.tip_mm).norm(), 1.5) << "frame " << frame;
+    ASSERT_TRUE(seen.since_mark_mm) << "frame " << frame;
+    EXPECT_LT(seen.since_mark_mm->norm(), 0.3) << "frame " << frame;
+  }
+}
+
 TEST(InstrumentTracker, LosesAFreeInstrumentWhoseMaskIsGone) {
   const test::DrawnInstrument instrument;
   InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
