@@ -44,7 +44,8 @@ void describe(Settings& settings, MapOptions& options) {
   settings.polygon("organ_region_px", options.organ_region_px,
                    "outline of the organ in the left image as recorded; everything when left out");
   settings.number("thickness_mm", options.thickness_mm, {0, 500, true, false},
-                  "depth of the body behind its visible surface, along the optical axis");
+                  "depth of the body behind its visible surface, along the optical axis; of a rounded organ the mean "
+                  "(volume over shadow)");
   settings.path("volume", options.volume,
                 "instead of the thickness: the organ from a scan (.msh .vtk .vtu .obj .ply .stl), left camera frame");
   settings.choice<LengthUnit>("volume_unit", options.volume_unit, {{"mm", LengthUnit::mm}, {"m", LengthUnit::m}},

@@ -14,6 +14,7 @@
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/triangulate.h"
 #include "palpate/surface/cocone.h"
+#include "palpate/surface/extend_rim.h"
 
 namespace palpate {
 
@@ -114,7 +115,7 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   const PointCloud points = clean_points(map.cloud, spacing_mm, options.surface);
   map.report.clean_ms = watch.lap_ms();
 
-  map.surface = cocone(points.position_mm, options.surface);
+  map.surface = extend_rim(cocone(points.position_mm, options.surface), map.cloud.position_mm, spacing_mm);
   map.report.surface_ms = watch.lap_ms();
 
   Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
