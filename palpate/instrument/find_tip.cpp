@@ -24,8 +24,10 @@ struct EdgeLine {
 };
 
 constexpr int kLeastPixels = 60;
-constexpr double kApartWidths = 2;  // between the places where two shafts enter
-constexpr double kSolid = 0.85;     // share of a slice of the shaft that belongs to the mask
+constexpr double kApartWidths = 2;    // between the places where two shafts enter
+constexpr double kShaftShare = 0.5;   // of the full width that a slice of the shaft has
+constexpr double kSleeveShare = 0.8;  // the same where a thin rod comes out of a sleeve
+constexpr double kSolid = 0.85;       // share of a slice of the shaft that belongs to the mask
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -106,7 +108,7 @@ struct Shaft {
   double filled = 0;  ///< share of the pixels between the edges that belong to the mask
 };
 
-Shaft fit_shaft(const std::vector<Slice>& slices) {
+Shaft fit_shaft(const std::vector<Slice>& slices, double least_share) {
   Shaft shaft;
   std::vector<double> widths;
   for (const Slice& slice : slices)
@@ -119,7 +121,7 @@ Shaft fit_shaft(const std::vector<Slice>& slices) {
   double area = 0, pixels = 0;
   for (size_t i = 0; i < slices.size(); ++i) {
     const Slice& slice = slices[i];
-    if (slice.pixels == 0 || slice.cut || slice.width() < 0.5 * full_width) continue;
+    if (slice.pixels == 0 || slice.cut || slice.width() < least_share * full_width) continue;
     area += slice.width();
     pixels += slice.pixels;
     if (slice.pixels < kSolid * slice.width()) continue;  // between open jaws
@@ -208,13 +210,14 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   std::vector<Slice> slices;
   for (int pass = 0; pass < 3; ++pass) {
     slices = slices_along(pixels, border, entry, axis, first);
-    shaft = fit_shaft(slices);
+    shaft = fit_shaft(slices, kShaftShare);
     if (shaft.slices == 0) return {};
     if (pass == 2) break;
     const double turn = std::atan(0.5 * (shaft.low.slope + shaft.high.slope));
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
+  if (!looks_like_an_instrument(shaft, farthest)) shaft = fit_shaft(slices, kSleeveShare);
   if (!looks_like_an_instrument(shaft, farthest) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);

@@ -48,6 +48,19 @@ TEST(FindTip, FindsTheMiddleBetweenOpenJaws) {
   EXPECT_LT(cv::norm(found->tip_px - tip), 2.5);
 }
 
+TEST(FindTip, FindsTheEndOfAThinRodThatComesOutOfASleeve) {
+  for (double rod : {80.0, 140.0, 260.0}) {
+    const cv::Point2d tip(440.4, 290.7);
+    const double angle_deg = -166;
+    const cv::Point2d axis(std::cos(angle_deg * CV_PI / 180), std::sin(angle_deg * CV_PI / 180));
+    const cv::Mat sleeve = drawn_instrument(tip - rod * axis, angle_deg, 40, 8);
+    const auto found = find_tip(drawn_instrument(tip, angle_deg, 22, 6) | sleeve);
+    ASSERT_TRUE(found) << "rod of " << rod;
+    EXPECT_LT(cv::norm(found->tip_px - tip), 2) << "rod of " << rod;
+    EXPECT_GT(found->axis.dot(axis), 0.999) << "rod of " << rod;
+  }
+}
+
 TEST(FindTip, FindsNothingInAnEmptyMask) {
   EXPECT_FALSE(find_tip(cv::Mat::zeros(540, 960, CV_8U)));
 }
