@@ -8,6 +8,8 @@ namespace palpate {
 namespace {
 
 constexpr size_t kRecentFrames = 8;
+/// A tip that was lost for longer may have come from anywhere.
+constexpr int kMostLostFrames = 8;
 /// A tip that moved at least this far from one frame to the next was approaching.
 constexpr double kApproachStep_mm = 0.3;
 /// A tip is at rest when it moves less than this from one frame to the next: across the viewing ray, where it is seen
@@ -33,6 +35,7 @@ bool at_rest(const Vec3& before, const Vec3& now) {
 
 bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& tip_mm) {
   if (let_go_at_mm_ && (tip_mm - *let_go_at_mm_).norm() > kLeaveDistance_mm) let_go_at_mm_.reset();
+  lost_frames_ = 0;
   recent_tips_.push_back(tip_mm);
   if (recent_tips_.size() > kRecentFrames) recent_tips_.pop_front();
   if (let_go_at_mm_ || recent_tips_.size() < 3) return false;
@@ -48,18 +51,22 @@ bool OnsetDetector::update(double gap_mm, double gap_deviation_mm, const Vec3& t
   return longest_step_mm > kApproachStep_mm && at_rest(recent_tips_[recent_tips_.size() - 2], recent_tips_.back());
 }
 
-bool OnsetDetector::may_begin_again() {
-  return ++times_too_early_ <= kMostTimesTooEarly;
+bool OnsetDetector::may_begin_again(double gap_mm) {
+  return ++times_too_early_ <= kMostTimesTooEarly && gap_mm < threshold_mm_;
 }
 
 void OnsetDetector::lose() {
-  times_too_early_ = 0;
-  recent_tips_.clear();
+  if (++lost_frames_ > kMostLostFrames) start_again();
 }
 
 void OnsetDetector::let_go(const Vec3& tip_mm) {
-  lose();
+  start_again();
   let_go_at_mm_ = tip_mm;
+}
+
+void OnsetDetector::start_again() {
+  times_too_early_ = 0;
+  recent_tips_.clear();
 }
 
 }  // namespace palpate

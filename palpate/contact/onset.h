@@ -20,20 +20,24 @@ class OnsetDetector {
   /// free.
   bool update(double gap_mm, double gap_deviation_mm, const Vec3& tip_mm);
 
-  /// The contact that has just begun was too early: the tip had not come to rest yet. False when that has been so too
-  /// often for the tip to touch at all.
-  bool may_begin_again();
-  /// The tip was lost: what it did before says nothing about what comes.
+  /// The contact that has just begun was too early: the tip had not come to rest yet. False when the tip is away from
+  /// the surface by now, or when that has been so too often for it to touch at all.
+  bool may_begin_again(double gap_mm);
+  /// A frame without the tip. After some of them what it did before says nothing about what comes; until then the way
+  /// across the gap is part of its approach.
   void lose();
   /// The tip has let go at `tip_mm` and has to leave that place before it can touch again.
   void let_go(const Vec3& tip_mm);
 
  private:
+  void start_again();
+
   double threshold_mm_;
   std::optional<Vec3> let_go_at_mm_;
   std::deque<Vec3> recent_tips_;
   int frames_inside_ = 0;
   int times_too_early_ = 0;
+  int lost_frames_ = 0;
 };
 
 }  // namespace palpate

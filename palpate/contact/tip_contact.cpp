@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace palpate {
@@ -18,6 +19,8 @@ constexpr double kPressesAgain_mm = 0.2;
 /// the tissue is seen to have come to rest: it has not moved, and a share of the predicted motion, one standard
 /// deviation more, is less.
 constexpr double kLiftStep_mm = 0.08, kNearlyBack_mm = 0.15, kRestingShare = 0.3, kResting_mm = 0.03;
+/// Motion of the tissue from which its springing back is told from one that was hardly moved.
+constexpr double kSprungFrom_mm = 0.15;
 /// Of a tracked point across the viewing ray, mm; so many neighbours share their errors.
 constexpr double kPointDeviation_mm = 0.05;
 constexpr double kPointsThatAgree = 6;
@@ -26,15 +29,28 @@ constexpr int kFewestFollowingPoints = 6;
 /// A tip in the tissue that has risen by this in the last frames retreats; less may be noise of its depth.
 constexpr double kRetreat_mm = 0.4;
 constexpr size_t kRecentFrames = 4;
-/// A tip that has come to rest does not go on like this in the first frames of a contact without the tissue.
-constexpr int kSettlingFrames = 4;
+/// A tip that has come to rest does not go on like this without the tissue; where it does, before the tissue has ever
+/// followed, it did not hold it yet.
 constexpr double kUnsettledStep_mm = 0.3;
 /// Motion of the tissue (root mean square over the points) that can be told from its noise.
 constexpr double kTellingMotion_mm = 0.05;
 /// Between what a push and what a grasp predicts: nearer to which one the tissue moves.
 constexpr double kEvenShare = 0.25;
+/// Of the predicted motion, seen for sure: the tissue follows.
+constexpr double kFollowingShare = 0.3;
 /// Tissue beneath a push moves as the push says by more than this, or the tip is no longer there.
 constexpr double kLeastPushedShare = 0.15;
+
+/// How far the share of the predicted motion that the tissue shows may be off: one standard deviation.
+double deviation_of_share(const Follow& follow) {
+  if (follow.points < kFewestFollowingPoints) return std::numeric_limits<double>::infinity();
+  return kPointDeviation_mm / (std::sqrt(follow.points / kPointsThatAgree) * follow.predicted_mm);
+}
+
+/// Tissue springs back when it is let go: where it is displaced as predicted, something holds it.
+bool is_displaced(const Follow& follow) {
+  return follow.share - 2 * deviation_of_share(follow) > kEvenShare;
+}
 
 }  // namespace
 
@@ -98,12 +114,24 @@ bool TipContact::has_pressed() const {
   return pressed_frames_ >= kPressedFrames;
 }
 
+/// Tissue cannot stay behind a tip that stays in it, whatever a law that gives way there predicts; but it is seen when
+/// it springs back.
+bool TipContact::stays_in_tissue(double height_mm, const Follow& follow) {
+  recent_.push_back({height_mm, follow.seen_mm});
+  if (recent_.size() > kRecentFrames) recent_.pop_front();
+  double deepest_mm = height_mm, farthest_mm = 0;
+  for (const Recent& frame : recent_) {
+    deepest_mm = std::min(deepest_mm, frame.height_mm);
+    farthest_mm = std::max(farthest_mm, frame.seen_mm);
+  }
+  const bool springs_back = farthest_mm > kSprungFrom_mm && follow.seen_mm < kResting_mm;
+  return height_mm < -kPressed_mm && height_mm - deepest_mm < kRetreat_mm && !springs_back;
+}
+
 bool TipContact::lifts(const Follow& follow, double height_mm) const {
   if (!has_pressed() || height_mm - last_height_mm_ < kLiftStep_mm) return false;
   if (height_mm > -kNearlyBack_mm) return true;
-  const double all_mm = std::sqrt(follow.points / kPointsThatAgree) * follow.predicted_mm;
-  return follow.points >= kFewestFollowingPoints && follow.seen_mm < kResting_mm &&
-         follow.share + kPointDeviation_mm / all_mm < kRestingShare;
+  return follow.seen_mm < kResting_mm && follow.share + deviation_of_share(follow) < kRestingShare;
 }
 
 TipContact::State TipContact::state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm) {
@@ -125,7 +153,7 @@ double TipContact::friction_of(const HeldContact::Answer& answer) const {
 }
 
 bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const {
-  return frames_ <= kSettlingFrames && !has_pressed() && asked_for_ != Grip::push &&
+  return !followed_ && asked_for_ != Grip::push && (asked_for_ == Grip::grasp || !has_pressed()) &&
          (displacement_mm - last_displacement_mm_).norm() > kUnsettledStep_mm &&
          if_held.predicted_mm > kTellingMotion_mm && if_held.share < kEvenShare && as_believed.share < kEvenShare;
 }
@@ -144,22 +172,20 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   pressed_frames_ += height_mm < -kPressed_mm;
   Believed believed = believe(p_mm, seen);
   const Follow follow = compare_motion(seen, believed.predicted_mm);
+  followed_ |= follow.share - deviation_of_share(follow) > kFollowingShare;
   const bool unsettled = is_unsettled(displacement_mm, if_held_, believed.answer.let_go ? if_held_ : follow);
   last_displacement_mm_ = displacement_mm;
   bool let_go = false;
+  const bool may_slip = asked_for_ == Grip::automatic && height_mm < -kPressed_mm;
   if (judge_.grip() == Grip::grasp)
-    let_go = follow.let_go | release_.update(result.tip_mm, seen, believed.predicted_mm);
+    let_go = follow.let_go |
+             (release_.update(result.tip_mm, seen, believed.predicted_mm) && (may_slip || !is_displaced(follow)));
   else if (pushes_ && !believed.answer.let_go)
     let_go = follow.let_go && follow.share < kLeastPushedShare;
-  // Tissue cannot stay behind a tip that stays in it, whatever a law that gives way there predicts.
-  recent_heights_mm_.push_back(height_mm);
-  if (recent_heights_mm_.size() > kRecentFrames) recent_heights_mm_.pop_front();
-  const double deepest_mm = *std::min_element(recent_heights_mm_.begin(), recent_heights_mm_.end());
-  const bool stays_in_it = height_mm < -kPressed_mm && height_mm - deepest_mm < kRetreat_mm;
-  if (stays_in_it && asked_for_ == Grip::grasp) let_go = false;
+  if (stays_in_tissue(height_mm, follow) && (asked_for_ == Grip::grasp || (pushes_ && followed_))) let_go = false;
   let_go |= has_to_be_seen && follow.points < kFewestFollowingPoints;
   // A tip that loses hold of the tissue while it presses on it slides: what held it so far was friction.
-  if (let_go && judge_.grip() == Grip::grasp && asked_for_ == Grip::automatic && height_mm < -kPressed_mm) {
+  if (let_go && judge_.grip() == Grip::grasp && may_slip) {
     judge_.start(Grip::push);
     held_.raise_friction(held_friction_);
     pushes_ = true;

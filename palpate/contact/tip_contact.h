@@ -51,6 +51,7 @@ class TipContact {
   std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen);
   State state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm);
   bool lifts(const Follow& follow, double height_mm) const;
+  bool stays_in_tissue(double height_mm, const Follow& follow);
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
   double friction_of(const HeldContact::Answer& answer) const;
@@ -58,6 +59,10 @@ class TipContact {
   /// A point of the tissue before any tip moved it, and where it was moved to before it was first seen.
   struct Origin {
     Vec3 rest_mm, displacement_mm;
+  };
+
+  struct Recent {
+    double height_mm, seen_mm;
   };
 
   HeldContact held_;
@@ -71,7 +76,8 @@ class TipContact {
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;
-  std::deque<double> recent_heights_mm_;
+  bool followed_ = false;  // the tissue was seen to move with the tip
+  std::deque<Recent> recent_;
   double held_friction_ = 0;  // what the grasp of the last frame would take from a push
   Follow if_held_;            // how the tissue follows if the tip holds it; where that was asked for in this frame
 };

@@ -161,6 +161,20 @@ struct ForceEstimator::State {
     hand.onset.let_go(tip_mm);
   }
 
+  bool none_touches() const {
+    return std::none_of(hands.begin(), hands.end(), [](const Hand& hand) { return hand.contact.has_value(); });
+  }
+
+  /// The contact began too early, so that the tissue as last computed is not where it is.
+  bool begin_again(Hand& hand, const SeenFrame& seen) {
+    hand.contact.reset();
+    if (none_touches()) come_to_rest();
+    const Gap gap = gap_of(seen.instruments.tips[hand.instrument]);
+    if (!hand.onset.may_begin_again(gap.distance_mm)) return false;
+    begin_contact(hand, seen, gap);
+    return true;
+  }
+
   Gap gap_of(const TipObservation& tip) const { return gap_to_surface(tip.tip_mm, deformed_mm, boundary); }
 
   /// Where the free tip stands against the surface, and whether it begins to touch (Eq. 4).
@@ -210,10 +224,8 @@ struct ForceEstimator::State {
     const std::vector<TissuePoint> tissue =
         hand.tissue_motion.update(seen.pair, seen.instruments.left_mask, seen.instruments.right_mask);
     TipContact::Answer answer = hand.contact->update(p, tissue, has_to_be_seen);
-    if (answer.state == TipContact::State::unsettled && hand.onset.may_begin_again()) {
-      begin_contact(hand, seen, gap_of(tip));
+    if (answer.state == TipContact::State::unsettled && begin_again(hand, seen))
       answer = hand.contact->update(Vec3::Zero(), {});
-    }
     if (answer.state == TipContact::State::over || answer.state == TipContact::State::unsettled)
       end_contact(hand, tip.tip_mm);
     if (answer.state != TipContact::State::touching) return std::nullopt;
@@ -305,8 +317,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   for (const Hand& hand : s.hands)
     if (answers[hand.instrument]) s.report(hand, equilibrium, seen.scene.map_is_stale, of(hand.instrument));
   if (equilibrium.converged) s.show(equilibrium, estimate);
-  if (std::none_of(s.hands.begin(), s.hands.end(), [](const Hand& hand) { return hand.contact.has_value(); }))
-    s.come_to_rest();
+  if (s.none_touches()) s.come_to_rest();
   estimate.times.stress_ms = watch.lap_ms();
   for (ForceEstimate& other : estimate.further) other.times = estimate.times;
   return estimate;

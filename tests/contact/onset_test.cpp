@@ -50,6 +50,23 @@ TEST(Onset, OneBadTriangulationIsNoTouch) {
   EXPECT_EQ(onset_of({8, 6, 4, 3, -2.5, 3, 4, 6}), -1);
 }
 
+TEST(Onset, ATipThatIsLostOnItsLastWayTouchesWhereItIsSeenAtRestAgain) {
+  for (const int lost_frames : {2, 20}) {
+    OnsetDetector onset(kThreshold_mm);
+    for (double gap : {9.0, 6.0, 3.0}) EXPECT_FALSE(onset.update(gap, kDeviation_mm, {5, 5, 90 - gap}));
+    for (int i = 0; i < lost_frames; ++i) onset.lose();
+    bool touched = false;
+    for (double gap : {0.1, 0.05, 0.1}) touched |= onset.update(gap, kDeviation_mm, {5, 5, 90 - gap});
+    EXPECT_EQ(touched, lost_frames == 2) << "what was before a long loss says nothing";
+  }
+}
+
+TEST(Onset, ATipThatBeganTooEarlyMayBeginAgainOnlyAtTheSurface) {
+  OnsetDetector onset(kThreshold_mm);
+  EXPECT_TRUE(onset.may_begin_again(0.5));
+  EXPECT_FALSE(onset.may_begin_again(2.5));
+}
+
 TEST(Onset, AfterLettingGoTheTipHasToLeaveFirst) {
   OnsetDetector onset(kThreshold_mm);
   onset.let_go({5, 5, 90});

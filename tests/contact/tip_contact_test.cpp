@@ -28,6 +28,8 @@ class Scene {
   }
   /// The tip moves, the tissue is at rest.
   TipContact::Answer move_alone(const Vec3& p_mm) { return contact_.update(p_mm, tissue(false)); }
+  /// The tip moves, the tissue stays where it was moved to.
+  TipContact::Answer move_on(const Vec3& p_mm) { return contact_.update(p_mm, tissue(true)); }
 
   const TipContact& contact() const { return contact_; }
   const Vec3& true_force_N() const { return true_answer_.equilibrium.force_N; }
@@ -176,8 +178,27 @@ TEST(TipContact, ATipThatRetreatsAndLeavesTheTissueHasLetGo) {
 TEST(TipContact, AGraspThatGoesOnIntoTheTissueHasNotLetGo) {
   Scene scene(Grip::grasp, Grip::grasp);
   for (int i = 0; i <= 10; ++i) ASSERT_EQ(scene.move({0.05 * i, 0, 0.15 * i}).state, State::touching);
-  for (int i = 1; i <= 5; ++i)
-    EXPECT_EQ(scene.move_alone({0.5 + 0.3 * i, 0, 1.5 + 0.02 * i}).state, State::touching) << i;
+  for (int i = 1; i <= 5; ++i) EXPECT_EQ(scene.move_on({0.5 + 0.3 * i, 0, 1.5 + 0.02 * i}).state, State::touching) << i;
+}
+
+TEST(TipContact, AGraspThatPressedHasLetGoWhereTheTissueSpringsBack) {
+  Scene scene(Grip::grasp, Grip::grasp);
+  for (int i = 0; i <= 10; ++i) ASSERT_EQ(scene.move({0.2 * i, 0, 0.06 * i}).state, State::touching);
+  EXPECT_EQ(scene.move_alone({2.3, 0, 0.5}).state, State::over);
+}
+
+TEST(TipContact, AGraspIsNotLetGoByATipThatIsMeasuredBadlyWhileTheTissueStaysDisplaced) {
+  Scene scene(Grip::grasp, Grip::grasp);
+  for (int i = 0; i <= 10; ++i) ASSERT_EQ(scene.move({0.2 * i, 0, -0.2 * i}).state, State::touching);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(scene.move_on({2 + (i % 2 ? 0.3 : 0.0), 0, -2.0}).state, State::touching) << i;
+}
+
+TEST(TipContact, AGraspBeginsAnewWhenItsTipGoesOnBeforeTheTissueHasEverFollowed) {
+  for (const double into_mm : {1.0, -1.0}) {
+    Scene scene(Grip::grasp, Grip::grasp);
+    for (int i = 0; i < 8; ++i) ASSERT_EQ(scene.move_alone({0, 0, 0.01 * i}).state, State::touching);
+    EXPECT_EQ(scene.move_alone({0, 0, into_mm}).state, State::unsettled) << into_mm;
+  }
 }
 
 TEST(TipContact, ATipThatTremblesOnTheSurfaceKeepsTouching) {
