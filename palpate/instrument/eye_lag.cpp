@@ -9,8 +9,9 @@ namespace palpate {
 namespace {
 
 constexpr size_t kFrames = 12;
-constexpr double kLeastMotion_px = 0.55;  // deviation of the motion from frame to frame, below which nothing can be told
-constexpr double kSignificant = 5;       // deviations of the slope
+constexpr double kLeastMotion_px =
+    0.55;                           // deviation of the motion from frame to frame, below which nothing can be told
+constexpr double kSignificant = 5;  // deviations of the slope
 constexpr double kLeastSlope = 0.6, kMostSlope = 1.6;  // of rows over motion, for one frame
 constexpr double kNoLag = 0.4;
 
