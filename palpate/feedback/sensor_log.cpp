@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/kabsch.h"
 #include "palpate/feedback/csv_table.h"
 
 namespace palpate {
@@ -77,16 +76,6 @@ double correlation_of(const Pairs& pairs) {
   return spread > 0 ? (n * ab - a * b) / std::sqrt(spread) : 0;
 }
 
-/// The rotation R that brings R * sensor closest to the estimate.
-Mat3 rotation_of(const Pairs& pairs) {
-  Mat3 H = Mat3::Zero();
-  for (size_t i = 0; i < pairs.estimate_N.size(); ++i) H += pairs.sensor_N[i] * pairs.estimate_N[i].transpose();
-  const Eigen::JacobiSVD<Mat3> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vec3 signs = Vec3::Ones();
-  if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0) signs.z() = -1;
-  return svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
-}
-
 double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor) {
   const double first = sensor.front().time_s - estimate.back().time_s,
                last = sensor.back().time_s - estimate.front().time_s;
@@ -136,7 +125,7 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   result.delay_s = best_delay_s(estimate, sensor);
   const Pairs pairs = pairs_at(estimate, sensor, result.delay_s);
   result.zero_N = pairs.zero_N;
-  result.camera_from_sensor = rotation_of(pairs);
+  result.camera_from_sensor = rotation_onto(pairs.sensor_N, pairs.estimate_N);
   result.frames = static_cast<int>(pairs.estimate_N.size());
   result.correlation = correlation_of(pairs);
   double along = 0, squared = 0;

@@ -4,13 +4,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/kabsch.h"
 
 namespace palpate {
 
@@ -48,13 +48,13 @@ CameraFromRobot fit(const std::vector<Pair>& pairs) {
     seen += pair.seen_mm / static_cast<double>(pairs.size());
     track += pair.track_mm / static_cast<double>(pairs.size());
   }
-  Mat3 H = Mat3::Zero();
-  for (const Pair& pair : pairs) H += (pair.track_mm - track) * (pair.seen_mm - seen).transpose();
-  const Eigen::JacobiSVD<Mat3> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vec3 signs = Vec3::Ones();
-  if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0) signs.z() = -1;
+  std::vector<Vec3> from, to;
+  for (const Pair& pair : pairs) {
+    from.push_back(pair.track_mm - track);
+    to.push_back(pair.seen_mm - seen);
+  }
   CameraFromRobot result;
-  result.rotation = svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
+  result.rotation = rotation_onto(from, to);
   result.translation_mm = seen - result.rotation * track;
   return result;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/onnx_file.h"
 #include "palpate/stereo/quiet_opencv.h"
 
 namespace palpate {
@@ -20,21 +21,8 @@ namespace {
       onnx.string(), why));
 }
 
-std::string first_line(const cv::Exception& error) {
-  return error.err.substr(0, error.err.find('\n'));
-}
-
 cv::dnn::Net read_network(const std::filesystem::path& onnx) {
-  if (!std::filesystem::is_regular_file(onnx)) refuse(onnx, "there is no such file");
-  try {
-    cv::dnn::Net network = cv::dnn::readNetFromONNX(onnx.string());
-    const std::vector<std::string> outputs = network.getUnconnectedOutLayersNames();
-    if (outputs.size() != 1)
-      refuse(onnx, fmt::format("the network has {} outputs ({})", outputs.size(), fmt::join(outputs, ", ")));
-    return network;
-  } catch (const cv::Exception& error) {
-    refuse(onnx, fmt::format("the network cannot be read ({})", first_line(error)));
-  }
+  return read_onnx(onnx, [&onnx](const std::string& why) { refuse(onnx, why); });
 }
 
 /// Size of the images that the file asks for; `otherwise` where it leaves that open.

@@ -7,6 +7,7 @@
 #include <opencv2/dnn.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/onnx_file.h"
 #include "palpate/stereo/quiet_opencv.h"
 
 namespace palpate {
@@ -21,21 +22,8 @@ constexpr float kMostReturn_px = 1;  // left-right check
       onnx.string(), why));
 }
 
-std::string first_line(const cv::Exception& error) {
-  return error.err.substr(0, error.err.find('\n'));
-}
-
 cv::dnn::Net read_network(const std::filesystem::path& onnx) {
-  if (!std::filesystem::is_regular_file(onnx)) refuse(onnx, "there is no such file");
-  try {
-    cv::dnn::Net network = cv::dnn::readNetFromONNX(onnx.string());
-    const std::vector<std::string> outputs = network.getUnconnectedOutLayersNames();
-    if (outputs.size() != 1)
-      refuse(onnx, fmt::format("the network has {} outputs ({})", outputs.size(), fmt::join(outputs, ", ")));
-    return network;
-  } catch (const cv::Exception& error) {
-    refuse(onnx, fmt::format("the network cannot be read ({})", first_line(error)));
-  }
+  return read_onnx(onnx, [&onnx](const std::string& why) { refuse(onnx, why); });
 }
 
 cv::Mat run(cv::dnn::Net& network, const cv::Mat& left, const cv::Mat& right, const std::filesystem::path& onnx) {
