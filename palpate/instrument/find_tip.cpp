@@ -147,6 +147,28 @@ bool looks_like_an_instrument(const Shaft& shaft, double length) {
          std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.6;
 }
 
+/// Whether what is thinner than the sleeve comes straight out of its end.
+bool has_rod(const std::vector<Slice>& slices, const Shaft& sleeve) {
+  const double margin = std::max(2.0, 0.1 * sleeve.width);
+  std::vector<double> s, low, high;
+  double last_of_sleeve = 0;
+  for (size_t i = 0; i < slices.size(); ++i) {
+    const Slice& slice = slices[i];
+    if (slice.pixels == 0 || slice.cut) continue;
+    const double at = static_cast<double>(i);
+    if (slice.low < sleeve.low.offset + sleeve.low.slope * at - margin ||
+        slice.high > sleeve.high.offset + sleeve.high.slope * at + margin)
+      return false;
+    if (slice.width() >= kSleeveShare * sleeve.width) {
+      last_of_sleeve = at;
+    } else if (slice.width() >= kShaftShare * sleeve.width) {
+      s.push_back(at), low.push_back(slice.low), high.push_back(slice.high);
+    }
+  }
+  if (s.size() < 8 || s[s.size() / 10] < last_of_sleeve) return false;
+  return fit_edge(s, low).deviation < margin && fit_edge(s, high).deviation < margin;
+}
+
 /// The far end in coordinates along and across the axis.
 cv::Point2d far_end(const std::vector<Slice>& slices, double first, double width) {
   // An end that is only a pixel or two thick is noise of the mask: the tip begins where the slices carry a jaw.
@@ -217,7 +239,10 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest)) shaft = fit_shaft(slices, kSleeveShare);
+  if (!looks_like_an_instrument(shaft, farthest)) {
+    shaft = fit_shaft(slices, kSleeveShare);
+    if (!has_rod(slices, shaft)) return {};
+  }
   if (!looks_like_an_instrument(shaft, farthest) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);
