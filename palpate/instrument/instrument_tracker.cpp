@@ -56,7 +56,7 @@ struct InstrumentTracker::State {
   std::optional<double> last_time_s;
 
   std::optional<TipTrack::Row> row_of(const TipTrack& track, const RectifiedPair& pair) const;
-  SeenByEye see(const cv::Mat& bgr, size_t eye) const;
+  SeenByEye see(const cv::Mat& bgr, size_t eye);
   std::optional<ImageTip> expected(size_t tracker, size_t eye, double seconds) const;
   void follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const;
   std::array<bool, kMostInstruments> part_touching(std::array<SeenByEye, 2>& seen, double seconds) const;
@@ -75,9 +75,10 @@ std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& tr
   return row->second;
 }
 
-SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) const {
+SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) {
   SeenByEye seen;
   seen.of_tracker.fill(-1);
+  if (networks.empty()) forget_what_left(bgr, models[eye]);
   seen.mask = networks.empty() ? segment_instrument(bgr, models[eye]) : networks[eye].mask(bgr);
   seen.instruments = find_instruments(seen.mask, models[eye].picture_area);
   return seen;

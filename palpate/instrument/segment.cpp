@@ -19,6 +19,8 @@ constexpr int kOtherRedness = 13;     // 255ths beyond what was seen nearby
 constexpr double kContinuedWidths = 4;
 constexpr double kLeastContinued_px = 3;  // at half size
 constexpr double kLeastNew = 0.2;         // share of an instrument that was not there in the static frame
+constexpr double kLeftShare = 0.9;        // of a part that stood still, where tissue shows instead
+constexpr double kLit = 1.5;              // times the least value, to tell tissue from shadow
 constexpr int kDarkest = 12;              // grey levels
 constexpr double kPalest = 0.08;          // redness of tissue that can still be told from metal
 constexpr double kReddest = 0.6;
@@ -240,6 +242,10 @@ void learn_still(const cv::Mat& grey, const cv::Mat& instrument, const cv::Mat& 
   darkest.copyTo(model.still_darkest, nearby);
   brightest.copyTo(model.still_brightest, nearby);
   model.still_at_border = nearby;
+  cv::Mat labels;
+  cv::connectedComponents(nearby, labels, 8);
+  labels.convertTo(model.still_parts, CV_8U);  // more than 255 share the last number
+  model.still_parts.setTo(0, ~(still & at_border));
 }
 
 cv::Mat half_mask(const cv::Mat& mask) {
@@ -348,6 +354,31 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const cv::Mat& sure, c
 
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model) {
   return metalness_beside(bgr(part), model.tissue_redness(part), model.least_value);
+}
+
+void forget_what_left(const cv::Mat& bgr, SegmentationModel& model) {
+  const cv::Rect box = cv::boundingRect(model.still_parts);
+  if (box.area() == 0) return;
+  const cv::Rect full = cv::Rect(2 * box.tl(), box.size() * 2) & cv::Rect({}, bgr.size());
+  const cv::Mat half = half_size(bgr(full));
+  const cv::Mat metal = metalness_beside(half, model.tissue_redness_half(box), model.least_value);
+  std::array<int, 256> all{}, tissue{};
+  for (int y = 0; y < box.height; ++y)
+    for (int x = 0; x < box.width; ++x) {
+      const uchar part = model.still_parts(box).at<uchar>(y, x);
+      ++all[part];
+      tissue[part] += metal.at<uchar>(y, x) < 128 && value_of(half.at<cv::Vec3b>(y, x)) > kLit * model.least_value;
+    }
+  for (int part = 1; part < 256; ++part) {
+    const size_t at = static_cast<size_t>(part);
+    if (all[at] == 0 || tissue[at] < kLeftShare * all[at]) continue;
+    cv::Mat place;
+    cv::dilate(model.still_parts == part, place, cv::Mat::ones(kTissueMoves, kTissueMoves, CV_8U));
+    model.still_darkest.setTo(255, place);
+    model.still_brightest.setTo(0, place);
+    model.still_at_border.setTo(0, place);
+    model.still_parts.setTo(0, model.still_parts == part);
+  }
 }
 
 SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& organ_mask) {

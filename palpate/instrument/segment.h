@@ -15,6 +15,8 @@ struct SegmentationModel {
   /// nearby, 255 and 0 where there are none; half size.
   cv::Mat still_darkest, still_brightest;
   cv::Mat still_at_border;  ///< 255 where that hangs together with the border and might be an instrument; half size
+  /// The grey pixels themselves of each such part, numbered from 1; 0 elsewhere; half size.
+  cv::Mat still_parts;
   /// Redness (see metalness) that most of the tissue around exceeds, in 255ths: pale tissue is told from metal by less
   /// colour than red tissue is. Of the whole image, and at half size.
   cv::Mat tissue_redness, tissue_redness_half;
@@ -29,6 +31,10 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
 /// 255 where one image shows an instrument: metal (grey, low chroma) on tissue (red), changed against the static frame,
 /// highlights of the tissue left out, small holes closed, blobs that do not look like an instrument dropped.
 cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model);
+
+/// Takes what stood grey at the border in the static frame and has left since for what it was, an instrument that was
+/// not recognised: where one image shows tissue instead, nothing is expected to stand still any more.
+void forget_what_left(const cv::Mat& bgr, SegmentationModel& model);
 
 /// How much each pixel of a part of the image looks like metal, 8-bit: 255 = without any redness
 /// (r - min(g, b)) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to

@@ -137,6 +137,19 @@ TEST(InstrumentTracker, LosesAnInstrumentThatLeavesAndFindsItAgain) {
   EXPECT_GE(found, 1);
 }
 
+TEST(InstrumentTracker, SeesAnInstrumentOfTheStaticFrameLeaveAndComeBackElsewhere) {
+  const test::DrawnInstrument instrument;
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({}, instrument, 0), {});
+  EXPECT_TRUE(tracker.update(test::draw_pair({}, instrument, 1)).tips[0].visible);
+  EXPECT_FALSE(tracker.update(test::draw_pair({.instrument = false}, {}, 2)).tips[0].visible);
+  const test::DrawnInstrument elsewhere{.tip_mm = {-10, -6, 84}, .direction = Vec3(0.8, 0.3, 0.4).normalized()};
+  for (int frame = 3; frame < 6; ++frame) {
+    const auto seen = tracker.update(test::draw_pair({}, elsewhere, frame)).tips[0];
+    ASSERT_TRUE(seen.visible) << "frame " << frame;
+    EXPECT_LT((seen.tip_mm - elsewhere.tip_mm).norm(), 1.5) << "frame " << frame;
+  }
+}
+
 TEST(InstrumentTracker, SaysNothingOnBlackFramesAndGoesOnAfterwards) {
   const test::DrawnInstrument instrument;
   InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({}, instrument, 0), {});

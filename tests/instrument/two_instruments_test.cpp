@@ -118,6 +118,21 @@ TEST(TwoInstruments, TouchingFromTheFirstFrameAreNotTakenForOne) {
       expect_near(tip, kFromTheRight, frame, "tip");
 }
 
+TEST(TwoInstruments, ThatTouchedInTheStaticFrameAreSeenWhenOneComesBackWhereItStood) {
+  const test::DrawnInstrument from_the_left{.tip_mm = kFromTheRight.tip_mm,
+                                            .direction = Vec3(0.8, 0.2, 0.5).normalized()};
+  InstrumentTracker tracker({}, test::drawn_rectification(),
+                            test::draw_pair_of(std::vector{kFromTheRight, from_the_left}, {}, 0), {});
+  int frame = 1;
+  for (; frame < 4; ++frame)
+    EXPECT_FALSE(tracker.update(test::draw_pair({.instrument = false}, {}, frame)).tips[0].visible);
+  for (; frame < 8; ++frame) {
+    const auto seen = tracker.update(test::draw_pair({}, kFromTheRight, frame)).tips;
+    ASSERT_TRUE(seen[0].visible) << "frame " << frame;
+    expect_near(seen[0], kFromTheRight, frame, "tip");
+  }
+}
+
 TEST(TwoInstruments, ComeFromTwoTipTracks) {
   const auto folder = std::filesystem::temp_directory_path();
   InstrumentOptions options;
