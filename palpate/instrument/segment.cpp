@@ -65,22 +65,24 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
 /// How much pixels look like metal beside tissue of the given redness; see metalness.
 cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, double least_value) {
   cv::Mat result(bgr.size(), CV_8U);
-  std::array<float, 256> full, per_redness, per_tissue;  // by brightness, by brightness, by redness of the tissue
-  for (int i = 0; i < 256; ++i) {
-    const double bright = std::clamp(2 * i / least_value - 1, 0.0, 1.0);
-    const size_t at = static_cast<size_t>(i);
-    full[at] = static_cast<float>(255 * bright);
-    per_redness[at] = static_cast<float>(255 * bright / std::max(i, 1));
-    per_tissue[at] = 255.0f / static_cast<float>(std::max(i, 1));
-  }
+  cv::Mat planes[3];
+  cv::split(bgr, planes);  // so that the compiler can take many pixels at once
+  const float per_least = static_cast<float>(2 / least_value);
+  const int columns = bgr.cols;
   for (int y = 0; y < bgr.rows; ++y) {
-    const cv::Vec3b* from = bgr.ptr<cv::Vec3b>(y);
-    const uchar* tissue = tissue_redness.ptr<uchar>(y);
-    uchar* to = result.ptr<uchar>(y);
-    for (int x = 0; x < bgr.cols; ++x) {
-      const size_t value = static_cast<size_t>(value_of(from[x]));
-      const float redness = static_cast<float>(redness_of(from[x]));
-      to[x] = static_cast<uchar>(std::max(0.0f, full[value] - per_redness[value] * per_tissue[tissue[x]] * redness));
+    const uchar* __restrict blue = planes[0].ptr<uchar>(y);
+    const uchar* __restrict green = planes[1].ptr<uchar>(y);
+    const uchar* __restrict red = planes[2].ptr<uchar>(y);
+    const uchar* __restrict tissue = tissue_redness.ptr<uchar>(y);
+    uchar* __restrict to = result.ptr<uchar>(y);
+    for (int x = 0; x < columns; ++x) {
+      const int b = blue[x], g = green[x], r = red[x];
+      const int least = b < g ? b : g, most = b < g ? g : b, value = r < most ? most : r;
+      const int redness = r - least > kColourNoise ? r - least - kColourNoise : 0;
+      const float of_tissue = 255.0f * static_cast<float>(redness) / static_cast<float>(value * tissue[x] + 1);
+      const float bright = per_least * static_cast<float>(value) - 1;
+      const float lit = bright < 0 ? 0 : bright > 1 ? 1 : bright;
+      to[x] = static_cast<uchar>(static_cast<int>(255 * lit * (of_tissue > 1 ? 0 : 1 - of_tissue)));
     }
   }
   return result;
@@ -268,7 +270,7 @@ cv::Mat redness_image(const cv::Mat& bgr) {
 /// instruments of a mask, half size.
 cv::Mat continued(const cv::Mat& half_bgr, const cv::Mat& grey, const cv::Mat& mask, const SegmentationModel& model) {
   cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
-  for (const ImageInstrument& instrument : find_instruments(mask, half_mask(model.picture_area))) {
+  for (const ImageInstrument& instrument : find_instruments(mask, model.picture_area_half)) {
     const ImageTip& tip = instrument.tip;
     const cv::Point2d side = 0.6 * tip.width_px * cv::Point2d(-tip.axis.y, tip.axis.x);
     const cv::Point2d back = tip.tip_px - tip.width_px * tip.axis;
@@ -324,23 +326,31 @@ cv::Mat continued(const cv::Mat& half_bgr, const cv::Mat& grey, const cv::Mat& m
   return result;
 }
 
+/// A part of a half-size mask at full size.
+cv::Mat doubled(const cv::Mat& half, const cv::Rect& part) {
+  cv::Mat result(part.size(), CV_8U);
+  for (int y = 0; y < part.height; ++y) {
+    const uchar* from = half.ptr<uchar>((y + part.y) / 2);
+    uchar* to = result.ptr<uchar>(y);
+    for (int x = 0; x < part.width; ++x) to[x] = from[(x + part.x) / 2];
+  }
+  return result;
+}
+
 /// The outline at full resolution: metal within a pixel or two of the coarse mask, holes closed. `sure` needs no metal.
 cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const cv::Mat& sure, const SegmentationModel& model) {
   cv::Mat mask = cv::Mat::zeros(bgr.size(), CV_8U);
   cv::Rect box = cv::boundingRect(coarse);
   if (box.area() == 0) return mask;
   box = cv::Rect(2 * box.x - 8, 2 * box.y - 8, 2 * box.width + 16, 2 * box.height + 16) & cv::Rect({}, bgr.size());
-  cv::Mat near, core, upsampled;
-  cv::resize(coarse, upsampled, bgr.size(), 0, 0, cv::INTER_NEAREST);
-  cv::dilate(upsampled(box), near, cv::Mat::ones(5, 5, CV_8U));
-  cv::erode(upsampled(box), core, cv::Mat::ones(7, 7, CV_8U));
+  cv::Mat near, core;
+  const cv::Mat upsampled = doubled(coarse, box);
+  cv::dilate(upsampled, near, cv::Mat::ones(5, 5, CV_8U));
+  cv::erode(upsampled, core, cv::Mat::ones(7, 7, CV_8U));
   cv::Mat fine = metalness(bgr, box, model);
   cv::medianBlur(fine, fine, 3);
   fine = ((fine >= 128) & near) | core;
-  if (!sure.empty()) {
-    cv::resize(sure, upsampled, bgr.size(), 0, 0, cv::INTER_NEAREST);
-    fine |= upsampled(box);
-  }
+  if (!sure.empty()) fine |= doubled(sure, box);
   cv::morphologyEx(fine, fine, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(fine, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
@@ -362,10 +372,11 @@ void forget_what_left(const cv::Mat& bgr, SegmentationModel& model) {
   const cv::Rect full = cv::Rect(2 * box.tl(), box.size() * 2) & cv::Rect({}, bgr.size());
   const cv::Mat half = half_size(bgr(full));
   const cv::Mat metal = metalness_beside(half, model.tissue_redness_half(box), model.least_value);
+  const cv::Mat parts = model.still_parts(box);
   std::array<int, 256> all{}, tissue{};
   for (int y = 0; y < box.height; ++y)
     for (int x = 0; x < box.width; ++x) {
-      const uchar part = model.still_parts(box).at<uchar>(y, x);
+      const uchar part = parts.at<uchar>(y, x);
       ++all[part];
       tissue[part] += metal.at<uchar>(y, x) < 128 && value_of(half.at<cv::Vec3b>(y, x)) > kLit * model.least_value;
     }
@@ -387,7 +398,8 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
   model.reference_half = half_size(static_bgr);
   model.picture_area = find_picture_area(static_bgr);
   const cv::Mat half_organ = half_mask(organ_mask);
-  const cv::Mat half_area = half_mask(model.picture_area);
+  model.picture_area_half = half_mask(model.picture_area);
+  const cv::Mat& half_area = model.picture_area_half;
 
   // Several times, because an instrument inside the organ region would be learnt as pale tissue the first time.
   learn_redness_everywhere({model.reference_half, half_organ, {}}, model);
@@ -411,7 +423,7 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
 }
 
 cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model) {
-  const cv::Mat half = half_size(bgr), half_area = half_mask(model.picture_area);
+  const cv::Mat half = half_size(bgr), &half_area = model.picture_area_half;
   const cv::Mat grey = grey_pixels(half, model), still = still_pixels(grey, half, model);
   cv::Mat coarse = instrument_blobs(grey & ~still, half_area);
   // An instrument that stood at the border in the static frame, too short to be recognised, hangs on what is still.

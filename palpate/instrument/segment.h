@@ -10,6 +10,7 @@ struct SegmentationModel {
   cv::Mat reference_bgr;   ///< rectified image of the static frame, same eye as the images to segment
   cv::Mat reference_mask;  ///< 255 where the static frame already shows an instrument
   cv::Mat picture_area;    ///< 255 inside the picture, 0 in the black surround of scope or rectification
+  cv::Mat picture_area_half;
   cv::Mat reference_half;  ///< the static frame at half size
   /// Where the static frame is grey without an instrument (highlights, tendon): how dark and how bright such pixels are
   /// nearby, 255 and 0 where there are none; half size.
