@@ -21,6 +21,9 @@ constexpr double kPressesAgain_mm = 0.2;
 constexpr double kLiftStep_mm = 0.08, kNearlyBack_mm = 0.15, kRestingShare = 0.3, kResting_mm = 0.03;
 /// Motion of the tissue from which its springing back is told from one that was hardly moved.
 constexpr double kSprungFrom_mm = 0.15;
+/// A step of the tip from one frame to the next that the tissue neither follows nor springs back from is an error of
+/// measurement.
+constexpr double kJump_mm = 0.5, kDisplaced_mm = 0.06, kStayingShare = 0.7;
 /// Of a tracked point across the viewing ray, mm; so many neighbours share their errors.
 constexpr double kPointDeviation_mm = 0.05;
 constexpr double kPointsThatAgree = 6;
@@ -158,8 +161,16 @@ bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held
          if_held.predicted_mm > kTellingMotion_mm && if_held.share < kEvenShare && as_believed.share < kEvenShare;
 }
 
-TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::vector<TissuePoint>& seen,
+/// The tip jumped, and the tissue stays as displaced as it was: it would have come along or sprung back.
+bool TipContact::is_jump_of_measurement(const Vec3& displacement_mm, const Follow& follow) const {
+  return judge_.grip() == Grip::grasp && (displacement_mm - last_displacement_mm_).norm() > kJump_mm &&
+         follow.points >= kFewestFollowingPoints && follow.seen_mm > kDisplaced_mm &&
+         follow.seen_mm > kStayingShare * last_seen_mm_;
+}
+
+TipContact::Answer TipContact::update(const Vec3& measured_mm, const std::vector<TissuePoint>& seen,
                                       bool has_to_be_seen) {
+  Vec3 displacement_mm = measured_mm - jumped_mm_;
   Answer result;
   result.tip_mm = touch_mm_ + displacement_mm;
   if (judge_.grip() == Grip::push && held_.has_left_its_footprint()) {
@@ -171,10 +182,9 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
   ++frames_;
   pressed_frames_ += height_mm < -kPressed_mm;
   Believed believed = believe(p_mm, seen);
-  const Follow follow = compare_motion(seen, believed.predicted_mm);
+  Follow follow = compare_motion(seen, believed.predicted_mm);
   followed_ |= follow.share - deviation_of_share(follow) > kFollowingShare;
   const bool unsettled = is_unsettled(displacement_mm, if_held_, believed.answer.let_go ? if_held_ : follow);
-  last_displacement_mm_ = displacement_mm;
   bool let_go = false;
   const bool may_slip = asked_for_ == Grip::automatic && height_mm < -kPressed_mm;
   if (judge_.grip() == Grip::grasp)
@@ -184,6 +194,16 @@ TipContact::Answer TipContact::update(const Vec3& displacement_mm, const std::ve
     let_go = follow.let_go && follow.share < kLeastPushedShare;
   if (stays_in_tissue(height_mm, follow) && (asked_for_ == Grip::grasp || (pushes_ && followed_))) let_go = false;
   let_go |= has_to_be_seen && follow.points < kFewestFollowingPoints;
+  if (let_go && !may_slip && is_jump_of_measurement(displacement_mm, follow)) {
+    jumped_mm_ += displacement_mm - last_displacement_mm_;
+    displacement_mm = last_displacement_mm_;
+    result.tip_mm = touch_mm_ + displacement_mm;
+    believed = grasped(result.tip_mm - held_.footprint().center_mm, seen);
+    follow = compare_motion(seen, believed.predicted_mm);
+    let_go = false;
+  }
+  last_seen_mm_ = follow.seen_mm;
+  last_displacement_mm_ = displacement_mm;
   // A tip that loses hold of the tissue while it presses on it slides: what held it so far was friction.
   if (let_go && judge_.grip() == Grip::grasp && may_slip) {
     judge_.start(Grip::push);

@@ -32,9 +32,9 @@ class TipContact {
     Vec3 tied_mm = Vec3::Zero();  ///< displacement that the footprint has in this equilibrium
   };
 
-  /// `displacement_mm`: of the tip since onset. `seen`: the tissue around the contact, since onset.
+  /// `measured_mm`: displacement of the tip since onset. `seen`: the tissue around the contact, since onset.
   /// `has_to_be_seen`: the tip was away for so long that it only holds if the tissue shows it.
-  Answer update(const Vec3& displacement_mm, const std::vector<TissuePoint>& seen, bool has_to_be_seen = false);
+  Answer update(const Vec3& measured_mm, const std::vector<TissuePoint>& seen, bool has_to_be_seen = false);
 
   const HeldContact& held() const { return held_; }
   /// `automatic` as long as it cannot be told.
@@ -51,6 +51,7 @@ class TipContact {
   std::vector<Vec3> predicted(const HeldContact::Answer& answer, const std::vector<TissuePoint>& seen);
   State state_of_push(const HeldContact::Answer& answer, const Follow& follow, double height_mm);
   bool lifts(const Follow& follow, double height_mm) const;
+  bool is_jump_of_measurement(const Vec3& displacement_mm, const Follow& follow) const;
   bool stays_in_tissue(double height_mm, const Follow& follow);
   bool is_unsettled(const Vec3& displacement_mm, const Follow& if_held, const Follow& as_believed) const;
   bool has_pressed() const;
@@ -72,7 +73,8 @@ class TipContact {
   GripJudge judge_;
   ReleaseDetector release_;
   Vec3 last_displacement_mm_ = Vec3::Zero();
-  double last_height_mm_ = 0;
+  Vec3 jumped_mm_ = Vec3::Zero();  // what of the measured displacement the tip did not make
+  double last_height_mm_ = 0, last_seen_mm_ = 0;
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame
   bool lifted_ = false;

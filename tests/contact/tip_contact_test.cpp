@@ -193,6 +193,17 @@ TEST(TipContact, AGraspIsNotLetGoByATipThatIsMeasuredBadlyWhileTheTissueStaysDis
   for (int i = 0; i < 6; ++i) EXPECT_EQ(scene.move_on({2 + (i % 2 ? 0.3 : 0.0), 0, -2.0}).state, State::touching) << i;
 }
 
+TEST(TipContact, AJumpOfTheMeasuredTipThatTheTissueDoesNotMakeIsNoneOfTheTip) {
+  Scene scene(Grip::grasp, Grip::grasp);
+  for (int i = 0; i <= 8; ++i) ASSERT_EQ(scene.move({0.2 * i, 0, -0.2 * i}).state, State::touching);
+  for (int i = 0; i < 4; ++i) {
+    const TipContact::Answer answer = scene.move_on({1.6, i < 2 ? 6.0 : 0.0, -1.6});
+    ASSERT_EQ(answer.state, State::touching) << i;
+    EXPECT_LT((answer.equilibrium.force_N - scene.true_force_N()).norm(), 0.05 * scene.true_force_N().norm()) << i;
+  }
+  EXPECT_EQ(scene.move_alone({1.8, 0, -1.6}).state, State::over);
+}
+
 TEST(TipContact, AGraspBeginsAnewWhenItsTipGoesOnBeforeTheTissueHasEverFollowed) {
   for (const double into_mm : {1.0, -1.0}) {
     Scene scene(Grip::grasp, Grip::grasp);
