@@ -78,6 +78,11 @@ Footprint PushedTissue::disc_at(const Eigen::Vector2d& place_mm) const {
   disc.samples.push_back(*middle);
   const double radius_mm = body_.patches[0].radius_mm - kGrowthPerEdge * kSamplesPerEdge * spacing_mm_;
   const int rings = static_cast<int>(radius_mm / spacing_mm_);
+  if (rings < 1)
+    throw BadInput(
+        fmt::format("simulate.gesture: a push with a patch of {:.1f} mm is a point load on the true body's elements; "
+                    "give a larger footprint_radius_mm or more simulate.body.elements",
+                    body_.patches[0].radius_mm));
   for (int ring = 1; ring <= rings; ++ring)
     for (int i = 0; i < 6 * ring; ++i) {
       const double angle = 2 * std::numbers::pi * i / (6 * ring);
