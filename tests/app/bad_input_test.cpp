@@ -150,15 +150,13 @@ TEST_F(BadInput, TheStageThatFailsIsToldWithTheSceneFile) {
 }
 
 TEST_F(BadInput, AKeyOfTheDesignThatIsNotThereYetIsToldAsSuch) {
-  const std::string good = read_file(in("scene.yaml"));
-  for (const char* key : {"camera_from_robot: [1]", "time_offset_s: 1"}) {
-    write_file(in("scene.yaml"), good);
-    spoil_scene("segmentation: colour", key);
-    EXPECT_THAT(complaint(), AllOf(HasSubstr("instrument."), HasSubstr("not available yet"))) << key;
-  }
-  write_file(in("scene.yaml"), good);
   spoil_scene("{segmentation: colour}", "[{segmentation: colour}, {segmentation: colour}]");
   EXPECT_THAT(complaint(), HasSubstr("instrument[1] is not available yet"));
+}
+
+TEST_F(BadInput, ARotationOfARobotThatIsNoneIsNamed) {
+  spoil_scene("segmentation: colour", "camera_from_robot: {rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}");
+  EXPECT_THAT(complaint(), HasSubstr("instrument.camera_from_robot.rotation is no rotation"));
 }
 
 TEST_F(BadInput, AnOrganRegionWithNothingToMatchIsNoticed) {
