@@ -42,7 +42,7 @@ struct HeldContact::State {
 
   Vec3 tangential(const Vec3& v) const { return v - v.dot(footprint().normal) * footprint().normal; }
 
-  Answer apart() { return {body->solve_without(number), true, false, Vec3::Zero()}; }
+  Answer apart() { return {body->solve_without(number), true, false, std::nullopt}; }
 
   Answer push(const Vec3& displacement_mm, const Answer* tied) {
     const Vec3 tip_mm = footprint().center_mm + displacement_mm;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "palpate/contact/contact_options.h"
 #include "palpate/contact/touched_body.h"
@@ -22,7 +23,7 @@ class HeldContact {
     Equilibrium equilibrium;
     bool let_go = false;          ///< a push whose tip is off the tissue
     bool slid = false;            ///< a push at the edge of its friction cone
-    Vec3 tied_mm = Vec3::Zero();  ///< displacement that the footprint has in this equilibrium
+    std::optional<Vec3> tied_mm;  ///< displacement of the footprint in this equilibrium; none off the tissue
   };
 
   /// The tissue goes where the tip goes.

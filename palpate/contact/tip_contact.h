@@ -29,7 +29,7 @@ class TipContact {
     Vec3 tip_mm = Vec3::Zero();
     double misfit_mm = 0;  ///< between the predicted and the seen motion of the tissue, median
     bool slid = false;
-    Vec3 tied_mm = Vec3::Zero();  ///< displacement that the footprint has in this equilibrium
+    std::optional<Vec3> tied_mm;  ///< displacement of the footprint in this equilibrium; none off the tissue
   };
 
   /// `measured_mm`: displacement of the tip since onset. `seen`: the tissue around the contact, since onset.
@@ -73,7 +73,8 @@ class TipContact {
   GripJudge judge_;
   ReleaseDetector release_;
   Vec3 last_displacement_mm_ = Vec3::Zero();
-  Vec3 jumped_mm_ = Vec3::Zero();  // what of the measured displacement the tip did not make
+  Vec3 last_jump_mm_ = Vec3::Zero();  // of the last frame
+  Vec3 jumped_mm_ = Vec3::Zero();     // what of the measured displacement the tip did not make
   double last_height_mm_ = 0, last_seen_mm_ = 0;
   int frames_ = 0, pressed_frames_ = 0;
   bool pushes_ = false;  // as believed in this frame

@@ -241,7 +241,9 @@ struct ForceEstimator::State {
     Equilibrium last;
     for (size_t i = 0; i < hands.size(); ++i) {
       if (!answers[i]) continue;
-      last = one_tip ? answers[i]->equilibrium : body->solve(hands[i].contact->held().number(), answers[i]->tied_mm);
+      const int tip = hands[i].contact->held().number();
+      const std::optional<Vec3>& tied_mm = answers[i]->tied_mm;
+      last = one_tip ? answers[i]->equilibrium : tied_mm ? body->solve(tip, *tied_mm) : body->solve_without(tip);
     }
     return last;
   }
