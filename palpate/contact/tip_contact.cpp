@@ -161,9 +161,11 @@ bool TipContact::is_unsettled(const Vec3& displacement_mm, const Follow& if_held
          if_held.predicted_mm > kTellingMotion_mm && if_held.share < kEvenShare && as_believed.share < kEvenShare;
 }
 
-/// The tip jumped, and the tissue stays as displaced as it was: it would have come along or sprung back.
+/// The tip jumped, and the tissue stays as displaced as it was: it would have come along or sprung back. Once, that is:
+/// a tip that goes on like this leaves tissue that something else keeps displaced.
 bool TipContact::is_jump_of_measurement(const Vec3& displacement_mm, const Follow& follow) const {
-  return judge_.grip() == Grip::grasp && (displacement_mm - last_displacement_mm_).norm() > kJump_mm &&
+  const Vec3 step_mm = displacement_mm - last_displacement_mm_;
+  return judge_.grip() == Grip::grasp && step_mm.norm() > kJump_mm && step_mm.dot(last_jump_mm_) <= 0 &&
          follow.points >= kFewestFollowingPoints && follow.seen_mm > kDisplaced_mm &&
          follow.seen_mm > kStayingShare * last_seen_mm_;
 }
@@ -194,8 +196,10 @@ TipContact::Answer TipContact::update(const Vec3& measured_mm, const std::vector
     let_go = follow.let_go && follow.share < kLeastPushedShare;
   if (stays_in_tissue(height_mm, follow) && (asked_for_ == Grip::grasp || (pushes_ && followed_))) let_go = false;
   let_go |= has_to_be_seen && follow.points < kFewestFollowingPoints;
-  if (let_go && !may_slip && is_jump_of_measurement(displacement_mm, follow)) {
-    jumped_mm_ += displacement_mm - last_displacement_mm_;
+  const bool jumped = let_go && !may_slip && is_jump_of_measurement(displacement_mm, follow);
+  last_jump_mm_ = jumped ? Vec3(displacement_mm - last_displacement_mm_) : Vec3::Zero();
+  if (jumped) {
+    jumped_mm_ += last_jump_mm_;
     displacement_mm = last_displacement_mm_;
     result.tip_mm = touch_mm_ + displacement_mm;
     believed = grasped(result.tip_mm - held_.footprint().center_mm, seen);

@@ -204,6 +204,14 @@ TEST(TipContact, AJumpOfTheMeasuredTipThatTheTissueDoesNotMakeIsNoneOfTheTip) {
   EXPECT_EQ(scene.move_alone({1.8, 0, -1.6}).state, State::over);
 }
 
+TEST(TipContact, ATipThatGoesFartherAndFartherFromTissueThatStaysDisplacedHasLetGo) {
+  Scene scene(Grip::grasp, Grip::grasp);
+  for (int i = 0; i <= 8; ++i) ASSERT_EQ(scene.move({0.2 * i, 0, -0.2 * i}).state, State::touching);
+  int frames = 0;
+  while (scene.move_on({1.6 + 2.0 * (frames + 1), 0, -1.6 - 1.0 * frames}).state == State::touching)
+    ASSERT_LT(++frames, 4);
+}
+
 TEST(TipContact, AGraspBeginsAnewWhenItsTipGoesOnBeforeTheTissueHasEverFollowed) {
   for (const double into_mm : {1.0, -1.0}) {
     Scene scene(Grip::grasp, Grip::grasp);
