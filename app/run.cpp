@@ -298,8 +298,7 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
 
   const Scene& scene = scene_file.scene;
-  ForceEstimator estimator(built.map, built.frame, built.rectification, scene.attachments, scene.instrument,
-                           scene.contact);
+  ForceEstimator estimator(built.map, built.frame, built.rectification, scene.instrument, scene.contact, scene.tuning);
   Recording recording(scene.recording);
   std::filesystem::create_directories(options.folder);
   write_map_files(built, options.folder);

@@ -1,5 +1,7 @@
 #include "palpate/contact/bordered_system.h"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 
 namespace palpate {
@@ -107,6 +109,19 @@ NewtonStep BorderedSystem::solve_at(const TetModel& model, const Eigen::VectorXd
   gradients_ += gradients;
   solves += gradients + kTangentCost;
   return step;
+}
+
+BorderedSystem::UnitResponse BorderedSystem::respond(const Eigen::SparseMatrix<double>& R,
+                                                     const Eigen::MatrixXd& E) const {
+  // K^-1 = A^-1 + Y (1/rho - S)^-1 Y^T with A = K + rho J^T J, Y = A^-1 J^T, S = J Y.
+  const Eigen::MatrixXd S = J_ * Y_;
+  const Eigen::MatrixXd JY_R = Y_.transpose() * R.transpose();
+  const Eigen::MatrixXd without_J = Eigen::MatrixXd::Identity(S.rows(), S.cols()) / rho_ - S;
+  const Eigen::MatrixXd K_inverse_R =
+      factor_.solve(Eigen::MatrixXd(R.transpose())) + Y_ * without_J.partialPivLu().solve(JY_R);
+  const Eigen::MatrixXd compliance = R * K_inverse_R;
+  const Eigen::MatrixXd multipliers = compliance.partialPivLu().solve(E);
+  return {K_inverse_R * multipliers, E.transpose() * multipliers};
 }
 
 Eigen::VectorXd BorderedSystem::times_stiffness(const Eigen::VectorXd& v) const {

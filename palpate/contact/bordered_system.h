@@ -44,6 +44,14 @@ class BorderedSystem {
   NewtonStep solve_at(const TetModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& f_int,
                       const Eigen::VectorXd& g, double share, int& solves);
 
+  /// Unit displacements of footprints, at the state that was factored.
+  struct UnitResponse {
+    Eigen::MatrixXd du;     ///< of the unknowns, one column per unit displacement
+    Eigen::MatrixXd force;  ///< E^T (R K^-1 R^T)^-1 E, N/mm
+  };
+  /// K du + R^T lambda = 0, R du = E for other rows R than J. The factor holds J; the Woodbury identity takes it out.
+  UnitResponse respond(const Eigen::SparseMatrix<double>& R, const Eigen::MatrixXd& E) const;
+
   /// K v at the state of the last `solve_at`.
   Eigen::VectorXd times_stiffness(const Eigen::VectorXd& v) const;
 

@@ -10,6 +10,9 @@ void describe(Settings& settings, ContactOptions& options) {
   settings.choice<Grip>("grip", options.grip, {{"auto", Grip::automatic}, {"grasp", Grip::grasp}, {"push", Grip::push}},
                         "grasp ties the patch in all directions, push never pulls, auto decides by what happens");
   settings.number("friction", options.friction, {0, 10}, "Coulomb coefficient of a push");
+  settings.choice<Drive>("drive", options.drive, {{"fused", Drive::fused}, {"tip", Drive::tip}},
+                         "fused: tip and tissue in one estimate, radius and scene motion unknown; tip: the paper's "
+                         "way, the tip's displacement with the radius as stated");
 }
 
 }  // namespace palpate

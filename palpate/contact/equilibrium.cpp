@@ -39,6 +39,20 @@ double largest_nodal_norm(const Eigen::VectorXd& v) {
   return largest;
 }
 
+Eigen::SparseMatrix<double> stacked(const std::vector<Eigen::SparseMatrix<double>>& parts, int columns) {
+  Eigen::Index rows = 0;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const Eigen::SparseMatrix<double>& part : parts) {
+    for (Eigen::Index column = 0; column < part.outerSize(); ++column)
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(part, column); entry; ++entry)
+        entries.emplace_back(rows + entry.row(), entry.col(), entry.value());
+    rows += part.rows();
+  }
+  Eigen::SparseMatrix<double> whole(rows, columns);
+  whole.setFromTriplets(entries.begin(), entries.end());
+  return whole;
+}
+
 }  // namespace
 
 struct EquilibriumSolver::State {
@@ -58,6 +72,7 @@ struct EquilibriumSolver::State {
   Eigen::VectorXd lambda;           // its multipliers
   Eigen::VectorXd displacement_mm;  // of each contact in turn
   int iterations_left = 0;
+  int factorizations = 0;
 
   int solves_left = 0;
   struct Step {
@@ -95,22 +110,18 @@ struct EquilibriumSolver::State {
     return target;
   }
 
+  ContactSensitivity sensitivity_of(const Eigen::SparseMatrix<double>& rows,
+                                    const std::vector<Eigen::Index>& rows_of_contact) const;
+
   /// Everything that hangs on which contacts there are; u stays.
   void tie() {
-    Eigen::Index rows = 0;
-    std::vector<Eigen::Triplet<double>> entries;
-    for (const Contact& contact : contacts) {
-      for (Eigen::Index column = 0; column < contact.J.outerSize(); ++column)
-        for (Eigen::SparseMatrix<double>::InnerIterator entry(contact.J, column); entry; ++entry)
-          entries.emplace_back(rows + entry.row(), entry.col(), entry.value());
-      rows += contact.J.rows();
-    }
-    J.resize(rows, model.unknown_count());
-    J.setFromTriplets(entries.begin(), entries.end());
+    std::vector<Eigen::SparseMatrix<double>> parts;
+    for (const Contact& contact : contacts) parts.push_back(contact.J);
+    J = stacked(parts, model.unknown_count());
     secants.clear();
     system.reset();
     if (!contacts.empty()) system = std::make_unique<BorderedSystem>(model, J);
-    lambda = Eigen::VectorXd::Zero(rows);
+    lambda = Eigen::VectorXd::Zero(J.rows());
     last_step = earlier_step = {};
   }
 
@@ -174,6 +185,7 @@ struct EquilibriumSolver::State {
     Trial trial = begin(p, target);
     if (!system->usable() || system->stale()) {
       solves_left -= kFactorCost;
+      ++factorizations;
       if (!system->factorize(model, trial.full)) return {false, trial.residual};
     }
     std::deque<double> residuals;
@@ -340,6 +352,69 @@ void EquilibriumSolver::hold_also(const Footprint& footprint) {
   s.displacement_mm.conservativeResize(s.displacement_mm.size() + 3);
   s.displacement_mm.tail<3>().setZero();
   s.tie();
+}
+
+void EquilibriumSolver::replace(const std::vector<Footprint>& footprints) {
+  State& s = *state_;
+  for (size_t i = 0; i < s.contacts.size(); ++i) {
+    State::Contact& contact = s.contacts[i];
+    contact.J = constraint_matrix(s.model, footprints.at(i));
+    contact.begin_mm = Eigen::VectorXd::Zero(contact.J.rows());
+    const Eigen::VectorXd moved_mm = contact.J * s.u;
+    s.displacement_mm.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+        Eigen::Map<const Eigen::Matrix3Xd>(moved_mm.data(), 3, moved_mm.size() / 3).rowwise().mean();
+  }
+  s.balanced = false;
+  s.tie();
+}
+
+namespace {
+
+/// Columns x, y, z of each contact: the rows of J that one displacement of it moves.
+Eigen::MatrixXd unit_displacements(const std::vector<Eigen::Index>& rows_of_contact, Eigen::Index rows) {
+  Eigen::MatrixXd E = Eigen::MatrixXd::Zero(rows, 3 * static_cast<Eigen::Index>(rows_of_contact.size()));
+  Eigen::Index row = 0;
+  for (size_t i = 0; i < rows_of_contact.size(); ++i) {
+    const Eigen::Index count = rows_of_contact[i];
+    E.block(row, 3 * static_cast<Eigen::Index>(i), count, 3) = Mat3::Identity().replicate(count / 3, 1);
+    row += count;
+  }
+  return E;
+}
+
+}  // namespace
+
+ContactSensitivity EquilibriumSolver::State::sensitivity_of(const Eigen::SparseMatrix<double>& rows,
+                                                            const std::vector<Eigen::Index>& rows_of_contact) const {
+  ContactSensitivity answer;
+  if (!system || !system->usable()) return answer;
+  const Eigen::MatrixXd E = unit_displacements(rows_of_contact, rows.rows());
+  const BorderedSystem::UnitResponse response = system->respond(rows, E);
+  answer.motion.resize(3 * model.node_count(), E.cols());
+  for (Eigen::Index column = 0; column < E.cols(); ++column)
+    answer.motion.col(column) = model.expand(response.du.col(column));
+  answer.force = response.force;
+  return answer;
+}
+
+int EquilibriumSolver::factorizations() const {
+  return state_->factorizations;
+}
+
+ContactSensitivity EquilibriumSolver::sensitivity() const {
+  std::vector<Eigen::Index> rows_of_contact;
+  for (const State::Contact& contact : state_->contacts) rows_of_contact.push_back(contact.J.rows());
+  return state_->sensitivity_of(state_->J, rows_of_contact);
+}
+
+ContactSensitivity EquilibriumSolver::sensitivity_with(const std::vector<Footprint>& footprints) const {
+  std::vector<Eigen::SparseMatrix<double>> parts;
+  std::vector<Eigen::Index> rows_of_contact;
+  for (const Footprint& footprint : footprints) {
+    parts.push_back(constraint_matrix(state_->model, footprint));
+    rows_of_contact.push_back(parts.back().rows());
+  }
+  return state_->sensitivity_of(stacked(parts, state_->model.unknown_count()), rows_of_contact);
 }
 
 void EquilibriumSolver::let_go(size_t number) {

@@ -43,6 +43,13 @@ struct ContactStiffness {
   Vec3 force_at(const Vec3& p_mm) const { return force_N + stiffness_N_per_mm * (p_mm - displacement_mm); }
 };
 
+/// How the answer changes with what is known badly, to first order: the columns are x, y, z of contact 0, of contact
+/// 1, ...
+struct ContactSensitivity {
+  Eigen::MatrixXd motion;  ///< du/dp of every node (3 n rows)
+  Eigen::MatrixXd force;   ///< dF/dp, N/mm: three rows for each contact
+};
+
 /// Keeps the factor and the last state of one body with the footprints that are held; solves for the displacements p of
 /// the footprints.
 class EquilibriumSolver {
@@ -59,6 +66,9 @@ class EquilibriumSolver {
   void let_go(size_t number);
   /// Ends all of them.
   void release();
+  /// Other footprints for the contacts that are held, in their order. The tissue stays as it is; displacements count
+  /// from rest.
+  void replace(const std::vector<Footprint>& footprints);
 
   /// Newton on Eq. 3 from the last state: K u + J^T lambda = f, J u = p with the same p for every sample of a contact.
   /// The factor of an earlier state serves as long as it makes the residual fall quickly, then as the preconditioner of
@@ -70,6 +80,13 @@ class EquilibriumSolver {
   /// The stiffness of the first contact at the state of the last answer, the others held where they are:
   /// (J K^-1 J^T)^-1 condensed on one displacement of all its samples, by three solves.
   ContactStiffness contact_stiffness();
+
+  /// At the state in which the stiffness was factored last, without a further factorization.
+  ContactSensitivity sensitivity() const;
+  /// The same if the contacts had these footprints instead, one for each.
+  ContactSensitivity sensitivity_with(const std::vector<Footprint>& footprints) const;
+  /// How often the stiffness was factored so far: what `sensitivity` hangs on.
+  int factorizations() const;
 
  private:
   struct State;

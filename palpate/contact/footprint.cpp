@@ -169,6 +169,20 @@ Eigen::MatrixXd means_of(const LaidDisc& disc, int degree) {
   return means;
 }
 
+/// The triangles that a disc of this radius can lie on.
+std::vector<Triangle> triangles_near(const std::vector<Vec3>& nodes, const std::vector<Triangle>& boundary,
+                                     const Vec3& center, double radius_mm) {
+  std::vector<Triangle> near;
+  for (const Triangle& t : boundary) {
+    const Vec3 &a = nodes[static_cast<size_t>(t[0])], &b = nodes[static_cast<size_t>(t[1])],
+               &c = nodes[static_cast<size_t>(t[2])];
+    const Vec3 middle = (a + b + c) / 3;
+    const double reach_mm = std::max({(a - middle).norm(), (b - middle).norm(), (c - middle).norm()});
+    if ((middle - center).norm() < reach_mm + 2 * radius_mm) near.push_back(t);
+  }
+  return near;
+}
+
 bool are_independent(const TetModel& model, const Footprint& footprint) {
   std::vector<SparseRow> basis;
   for (Eigen::Index m = 0; m < footprint.means.rows(); ++m)
@@ -193,10 +207,11 @@ Footprint make_footprint(const TetModel& model, const std::vector<Triangle>& bou
   footprint.normal.normalize();
 
   const Footprint::Sample at_middle{t, middle.barycentric};
-  const double edge = edge_under(lay_disc(nodes, boundary, footprint, at_middle, radius_mm), nodes);
+  const std::vector<Triangle> near = triangles_near(nodes, boundary, footprint.center_mm, radius_mm);
+  const double edge = edge_under(lay_disc(nodes, near, footprint, at_middle, radius_mm), nodes);
   for (const Order& order : kOrders) {
     const double effective_mm = std::max(radius_mm - order.growth_per_edge * edge, kLeastRadiusShare * radius_mm);
-    const LaidDisc disc = lay_disc(nodes, boundary, footprint, at_middle, effective_mm);
+    const LaidDisc disc = lay_disc(nodes, near, footprint, at_middle, effective_mm);
     footprint.samples = disc.samples;
     footprint.means = means_of(disc, order.degree);
     if (are_independent(model, footprint)) break;

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "palpate/core/geometry.h"
+#include "palpate/infer/band.h"
+#include "palpate/infer/hypotheses.h"
 
 namespace palpate {
 
@@ -35,6 +37,11 @@ struct ForceEstimate {
   double max_von_mises_kPa = 0;
   double residual = 0;
   double misfit_mm = 0;
+  ForceBand band;  ///< from the images, at the stated tissue
+  Hold grip = Hold::free;
+  double p_contact = 0;
+  double footprint_mm = 0;       ///< radius as estimated
+  Vec3 scene_mm = Vec3::Zero();  ///< motion of the middle of the map's visible surface since the map
   std::vector<std::string> warnings;
   FrameTimes times;
   std::vector<ForceEstimate> further;  ///< of the further instruments (forces_2.csv), without what is drawn

@@ -5,18 +5,19 @@
 #include "palpate/contact/contact_options.h"
 #include "palpate/estimate/force_estimate.h"
 #include "palpate/estimate/tissue_map.h"
+#include "palpate/infer/inference_parameters.h"
 #include "palpate/instrument/instrument_tracker.h"
 
 namespace palpate {
 
-/// COMPUTE, the second stage: every frame from two images to a force. Keeps the map, the tracker and the contact
+/// COMPUTE, the second stage: every frame from two images to a force. Keeps the map, the trackers and what is believed
 /// between frames.
 class ForceEstimator {
  public:
-  /// `static_frame`: the frame that the map was built from. `attachments`: as the map was built with.
+  /// `static_frame`: the frame that the map was built from.
   ForceEstimator(TissueMap map, const StereoFrame& static_frame, const Rectification& rectification,
-                 const AttachmentOptions& attachments, const InstrumentOptions& instrument,
-                 const ContactOptions& contact);
+                 const InstrumentOptions& instrument, const ContactOptions& contact,
+                 const InferenceParameters& tuning = {});
   ~ForceEstimator();
   ForceEstimator(ForceEstimator&&) noexcept;
 

@@ -99,6 +99,8 @@ void describe(Settings& settings, Scene& scene) {
   settings.not_yet(kSceneKeysNotYet);
   settings.group("contact", "when and how the tip holds the tissue",
                  [&scene](Settings& group) { describe(group, scene.contact); });
+  settings.group("tuning", "numbers that the inference decides by (docs/inference.md)",
+                 [&scene](Settings& group) { describe(group, scene.tuning); });
 }
 
 Scene read_scene(const std::filesystem::path& file) {

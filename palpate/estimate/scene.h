@@ -5,6 +5,7 @@
 #include "palpate/contact/contact_options.h"
 #include "palpate/core/settings.h"
 #include "palpate/estimate/tissue_map.h"
+#include "palpate/infer/inference_parameters.h"
 #include "palpate/instrument/instrument_tracker.h"
 #include "palpate/stereo/recording.h"
 
@@ -18,6 +19,7 @@ struct Scene {
   AttachmentOptions attachments;
   InstrumentOptions instrument;
   ContactOptions contact;
+  InferenceParameters tuning;
 };
 
 /// Binds every part but `recording`, which a scene that is to be simulated does not have.

@@ -135,6 +135,7 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   };
   assign_labels(map.mesh, options.labels, frame.left.size(), project_px);
   for (const TissueLabel& label : options.labels) map.tissue.of_label.push_back(label.tissue);
+  map.attachments = attachments;
   map.fixed_nodes = select_attachments(map.mesh, attachments, project_px);
   require_every_piece_held(map.mesh, map.fixed_nodes);
   map.report.attachments_ms = watch.lap_ms();

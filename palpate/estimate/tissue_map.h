@@ -59,11 +59,12 @@ struct MapReport {
 
 /// V of Eq. 1 and everything seen on the way to it.
 struct TissueMap {
-  PointCloud cloud;              ///< S
-  Surface surface;               ///< S*
-  TetMesh mesh;                  ///< V
-  std::vector<int> fixed_nodes;  ///< b
-  TissueOptions tissue;          ///< gamma
+  PointCloud cloud;               ///< S
+  Surface surface;                ///< S*
+  TetMesh mesh;                   ///< V
+  std::vector<int> fixed_nodes;   ///< b
+  AttachmentOptions attachments;  ///< where b was taken from, for meshes that are finer somewhere
+  TissueOptions tissue;           ///< gamma
   Element element = Element::averaged;
   DisparityMap disparity;
   cv::Mat organ_mask;  ///< 255 = organ region, rectified left image

@@ -13,7 +13,8 @@ namespace {
 
 constexpr const char* kHeader =
     "frame,time_s,status,in_contact,fx_N,fy_N,fz_N,force_N,mean_nodal_force_N,tip_x_mm,tip_y_mm,tip_z_mm,"
-    "max_von_mises_kPa,residual,frame_ms,misfit_mm,warnings";
+    "max_von_mises_kPa,residual,frame_ms,misfit_mm,warnings,force_low_N,force_high_N,force_low_total_N,"
+    "force_high_total_N,grip,p_contact,footprint_mm,scene_x_mm,scene_y_mm,scene_z_mm";
 
 /// Written for a residual that is not finite: far above every tolerance, still a number.
 constexpr double kUnboundedResidual = 1e6;
@@ -63,6 +64,8 @@ ForceRow parse_row(const CsvTable& table, const CsvTable::Row& line, const std::
   row.frame_ms = finite_or(number("frame_ms"), 0);
   row.misfit_mm = finite_or(number("misfit_mm"), 0);
   row.warnings = table.text(line, "warnings");
+  row.force_low_N = number("force_low_N");
+  row.force_high_N = number("force_high_N");
   return row;
 }
 
@@ -76,6 +79,7 @@ ForceRow to_row(const ForceEstimate& estimate) {
   row.status = status_name(status);
   row.frame_ms = finite_or(estimate.times.total_ms(), 0);
   row.warnings = joined(estimate.warnings);
+  row.scene_mm = estimate.scene_mm.allFinite() ? estimate.scene_mm : Vec3::Zero();
   if (status == FrameStatus::tool_lost) return row;
 
   row.tip_mm = estimate.tip_mm;
@@ -83,6 +87,11 @@ ForceRow to_row(const ForceEstimate& estimate) {
   row.misfit_mm = finite_or(estimate.misfit_mm, 0);
   row.in_contact = status == FrameStatus::ok || status == FrameStatus::not_converged ||
                    (status == FrameStatus::map_stale && estimate.in_contact);
+  row.footprint_mm = finite_or(estimate.footprint_mm, 0);
+  row.p_contact = finite_or(estimate.p_contact, 0);
+  if (row.in_contact) row.grip = hold_name(estimate.grip);
+  row.force_low_N = row.force_low_total_N = finite_or(estimate.band.low_N, 0);
+  row.force_high_N = row.force_high_total_N = finite_or(estimate.band.high_N, 0);
   if (status == FrameStatus::no_contact || status == FrameStatus::not_converged) return row;
 
   row.force_N = estimate.force_N;
@@ -103,10 +112,13 @@ void ForcesWriter::write(const ForceEstimate& estimate) {
 
 void ForcesWriter::write(const ForceRow& row) {
   stream_ << fmt::format(
-      "{},{:.4f},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3e},{:.3f},{:.4f},{}\n",
+      "{},{:.4f},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3e},{:.3f},{:.4f},{},"
+      "{:.6f},{:.6f},{:.6f},{:.6f},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
       row.frame, row.time_s, row.status, row.in_contact ? 1 : 0, row.force_N.x(), row.force_N.y(), row.force_N.z(),
       row.force_magnitude_N, row.mean_nodal_force_N, row.tip_mm.x(), row.tip_mm.y(), row.tip_mm.z(),
-      row.max_von_mises_kPa, row.residual, row.frame_ms, row.misfit_mm, row.warnings);
+      row.max_von_mises_kPa, row.residual, row.frame_ms, row.misfit_mm, row.warnings, row.force_low_N, row.force_high_N,
+      row.force_low_total_N, row.force_high_total_N, row.grip, row.p_contact, row.footprint_mm, row.scene_mm.x(),
+      row.scene_mm.y(), row.scene_mm.z());
   stream_.flush();
   if (!stream_) throw Unfinished(fmt::format("cannot write {}: is the disk full?", file_.string()));
 }

@@ -25,6 +25,12 @@ struct ForceRow {
   double frame_ms = 0;
   double misfit_mm = 0;
   std::string warnings;  ///< names separated by ";"
+  double force_low_N = 0, force_high_N = 0;  ///< 95 % band; NaN where a file has none
+  double force_low_total_N = 0, force_high_total_N = 0;
+  std::string grip = "free";
+  double p_contact = 0;
+  double footprint_mm = 0;
+  Vec3 scene_mm = Vec3::Zero();
 
   bool has_tip() const { return status != "tool_lost" && tip_mm.allFinite(); }
 };

@@ -9,7 +9,6 @@
 #include <random>
 
 #include "palpate/contact/equilibrium.h"
-#include "palpate/contact/held_contact.h"
 #include "tests/support/meshes.h"
 
 namespace palpate {

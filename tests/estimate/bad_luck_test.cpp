@@ -43,7 +43,7 @@ class BadLuck : public testing::Test {
 
   ForceEstimator estimator(int static_frame = 0) const {
     const Scene& scene = sequence_->scene;
-    return ForceEstimator(sequence_->map, frame(static_frame), sequence_->rectification, scene.attachments,
+    return ForceEstimator(sequence_->map, frame(static_frame), sequence_->rectification,
                           scene.instrument, scene.contact);
   }
 
@@ -89,16 +89,28 @@ cv::Mat shifted(const cv::Mat& image, double x, double y) {
   return result;
 }
 
-TEST_F(BadLuck, ABumpedCameraMakesTheMapStaleWithAndWithoutContact) {
+TEST_F(BadLuck, ABumpedCameraIsAMotionOfTheSceneAndNoForce) {
   for (const int bump : {8, 26}) {
     const auto answers = run([bump](StereoFrame& f) {
       if (f.index >= bump) f.left = shifted(f.left, 9, 6), f.right = shifted(f.right, 9, 6);
       return true;
     });
-    for (const ForceEstimate& answer : answers) {
-      const bool admits = answer.status == FrameStatus::map_stale || answer.status == FrameStatus::tool_lost;
-      EXPECT_EQ(admits, answer.frame >= bump) << answer.frame << ' ' << status_name(answer.status);
-    }
+    expect_no_wrong_force(answers);
+    EXPECT_EQ(status_name(answers.back().status), "ok");
+    EXPECT_GT(answers.back().scene_mm.norm(), 0.5);
+  }
+}
+
+TEST_F(BadLuck, AnotherSceneMakesTheMapStale) {
+  const auto answers = run([this](StereoFrame& f) {
+    if (f.index < 26) return true;
+    cv::flip(frame(0).left, f.left, -1);
+    cv::flip(frame(0).right, f.right, -1);
+    return true;
+  });
+  for (const ForceEstimate& answer : answers) {
+    const bool admits = answer.status == FrameStatus::map_stale || answer.status == FrameStatus::tool_lost;
+    EXPECT_EQ(admits, answer.frame >= 26) << answer.frame << ' ' << status_name(answer.status);
   }
 }
 

@@ -26,7 +26,7 @@ struct Sequence {
         map(build_tissue_map(rest, rectification, scene.map, scene.tissue, scene.attachments)) {}
 
   ForceEstimator estimator() const {
-    return ForceEstimator(map, rest, rectification, scene.attachments, scene.instrument, scene.contact);
+    return ForceEstimator(map, rest, rectification, scene.instrument, scene.contact);
   }
 };
 

@@ -58,7 +58,9 @@ TEST_F(ForcesFile, HasTheColumnsOfTheContract) {
   EXPECT_THAT(
       text_of("forces.csv"),
       testing::StartsWith("frame,time_s,status,in_contact,fx_N,fy_N,fz_N,force_N,mean_nodal_force_N,tip_x_mm,tip_y_mm,"
-                          "tip_z_mm,max_von_mises_kPa,residual,frame_ms,misfit_mm,warnings\n7,"));
+                          "tip_z_mm,max_von_mises_kPa,residual,frame_ms,misfit_mm,warnings,force_low_N,force_high_N,"
+                          "force_low_total_N,force_high_total_N,grip,p_contact,footprint_mm,scene_x_mm,scene_y_mm,"
+                          "scene_z_mm\n7,"));
 }
 
 TEST_F(ForcesFile, KeepsEveryRowWhileTheWriterIsStillOpen) {

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "palpate/core/geometry.h"
+#include "palpate/infer/inference_parameters.h"
+
+namespace palpate {
+
+/// Rigid motion of the scene since the map frame: x = about + translation + exp(rotation) (y - about).
+struct SceneMotion {
+  Vec3 translation_mm = Vec3::Zero();
+  Vec3 rotation_rad = Vec3::Zero();
+  Vec3 about_mm = Vec3::Zero();
+
+  Mat3 rotation() const;
+  Vec3 apply(const Vec3& in_map_mm) const;
+  Vec3 undo(const Vec3& now_mm) const;
+};
+
+/// Where each unknown of the estimate stands in its vector: the scene's translation and rotation and the stereo's
+/// common disparity bias, then for each contact q, offset, log radius and
+/// gain (common error of the model's motion of the tissue).
+struct Unknowns {
+  static constexpr Eigen::Index kTranslation = 0, kRotation = 3, kBias = 6, kScene = 7, kContact = 8;
+  static Eigen::Index q(size_t contact) { return kScene + kContact * static_cast<Eigen::Index>(contact); }
+  static Eigen::Index offset(size_t contact) { return q(contact) + 3; }
+  static Eigen::Index log_radius(size_t contact) { return q(contact) + 6; }
+  static Eigen::Index gain(size_t contact) { return q(contact) + 7; }
+  static Eigen::Index count(size_t contacts) { return q(contacts); }
+};
+
+/// A Gaussian over the unknowns.
+struct Belief {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+
+  size_t contacts() const { return static_cast<size_t>((mean.size() - Unknowns::kScene) / Unknowns::kContact); }
+  Vec3 q_mm(size_t contact) const { return mean.segment<3>(Unknowns::q(contact)); }
+  Vec3 offset_mm(size_t contact) const { return mean.segment<3>(Unknowns::offset(contact)); }
+  double log_radius(size_t contact) const { return mean[Unknowns::log_radius(contact)]; }
+  double gain(size_t contact) const { return mean[Unknowns::gain(contact)]; }
+  SceneMotion scene(const Vec3& about_mm) const;
+};
+
+/// Nothing touches, nothing has moved.
+Belief initial_belief(const InferenceParameters& parameters);
+
+/// After `seconds`: fast unknowns walk far, slow ones (offset, radius, gain) hardly.
+Belief predict(const Belief& belief, double seconds, const InferenceParameters& parameters);
+
+/// One more contact at the end, with these means and deviations, independent of the rest; its gain is 0.
+struct ContactPrior {
+  Vec3 q_mm = Vec3::Zero(), offset_mm = Vec3::Zero();
+  Mat3 q_covariance_mm2 = Mat3::Identity(), offset_covariance_mm2 = Mat3::Identity();
+  double log_radius = 0, log_radius_deviation = 1, gain_deviation = 0.03;
+};
+Belief with_contact(const Belief& belief, const ContactPrior& prior);
+/// The rest of it, whatever this contact's unknowns are.
+Belief without_contact(const Belief& belief, size_t contact);
+
+}  // namespace palpate

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "palpate/contact/contact_model.h"
+#include "palpate/contact/contact_options.h"
+#include "palpate/infer/belief.h"
+#include "palpate/infer/hypotheses.h"
+#include "palpate/instrument/instrument_tracker.h"
+#include "palpate/observe/tissue_tracker.h"
+
+namespace palpate {
+
+/// What a frame shows.
+struct FrameEvidence {
+  double time_s = 0;
+  std::vector<TissuePoint> tissue;
+  std::vector<TipObservation> tips;  ///< of each instrument
+  bool may_touch = true;             ///< the picture is new and lies behind the map frame
+};
+
+/// What is believed of one instrument.
+struct InstrumentAnswer {
+  Hold hold = Hold::free;
+  double p_contact = 0;
+  bool begins = false;  ///< the contact begins in this frame
+  bool tip_inferred = false;
+  bool converged = true;
+  Vec3 tip_mm = Vec3::Zero();   ///< left camera frame: in contact the middle of the patch
+  Vec3 force_N = Vec3::Zero();  ///< of the instrument on the tissue, left camera frame
+  Mat3 force_covariance_N2 = Mat3::Zero();
+  double mean_nodal_force_N = 0;
+  double footprint_mm = 0;
+  double misfit_mm = 0;
+  bool near_attachment = false;
+};
+
+struct FrameAnswer {
+  std::array<InstrumentAnswer, kMostInstruments> instruments;
+  SceneMotion scene;
+  bool explained = true;  ///< some hypothesis explains the tissue that is seen
+  /// The body under all contacts; empty where nothing touches.
+  std::optional<Equilibrium> equilibrium;
+};
+
+/// The causal maximum a posteriori estimate around Eq. 3 (docs/inference.md): keeps what is believed of scene and
+/// contacts from frame to frame.
+class ForceFilter {
+ public:
+  /// `points`: every tissue point that may be seen; `map`: the body at rest.
+  ForceFilter(ContactModel model, const AttachedMesh& map, std::vector<TissuePoint> points,
+              const Rectification& rectification, const ContactOptions& contact,
+              const InferenceParameters& parameters = {});
+  ~ForceFilter();
+  ForceFilter(ForceFilter&&) noexcept;
+
+  /// The points to be followed in the next frame, evenly over the organ and closer around each contact, with the motion
+  /// that is expected of them.
+  std::vector<TissuePoint> wanted_points() const;
+
+  /// Frames in order of time.
+  FrameAnswer update(const FrameEvidence& frame);
+
+  const ContactModel& model() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace palpate

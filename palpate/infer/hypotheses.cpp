@@ -1,0 +1,146 @@
+#include "palpate/infer/hypotheses.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace palpate {
+
+namespace {
+
+/// No hypothesis is ever ruled out for good.
+constexpr double kMinProbability = 1e-6;
+/// Coulomb's coefficient is known to a factor, not to a figure.
+constexpr double kFrictionDeviationRatio = 0.5;
+
+double& at(ByHold& values, Hold hold) {
+  return values[static_cast<size_t>(hold)];
+}
+
+double log_normal(double x, double deviation) {
+  return -0.5 * x * x / (deviation * deviation) - std::log(deviation * std::sqrt(2 * std::numbers::pi));
+}
+
+double log_normal(const Vec3& x, const Mat3& covariance) {
+  return -0.5 *
+         (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
+}
+
+double log_sum(double a, double b) {
+  const double max = std::max(a, b);
+  return max + std::log(std::exp(a - max) + std::exp(b - max));
+}
+
+}  // namespace
+
+std::string hold_name(Hold hold) {
+  constexpr const char* kNames[] = {"free", "grasp", "push", "slide"};
+  return kNames[static_cast<size_t>(hold)];
+}
+
+double log_normal_cdf(double x) {
+  if (x > -10) return std::log(0.5 * std::erfc(-x / std::numbers::sqrt2));
+  return -0.5 * x * x - std::log(-x * std::sqrt(2 * std::numbers::pi));
+}
+
+HoldFilter::HoldFilter(Grip grip) : grip_(grip), probability_{1, 0, 0, 0} {}
+
+bool HoldFilter::allows(Hold hold) const {
+  if (grip_ == Grip::grasp) return hold == Hold::free || hold == Hold::grasp;
+  if (grip_ == Grip::push) return hold != Hold::grasp;
+  return true;
+}
+
+void HoldFilter::predict(double seconds, const InferenceParameters& parameters) {
+  const auto changed = [seconds](double per_s) { return 1 - std::exp(-per_s * seconds); };
+  const double released = changed(parameters.release_per_s), slips = changed(parameters.slip_per_s),
+               sticks = changed(parameters.stick_per_s);
+  ByHold next = probability_;
+  for (Hold hold : {Hold::grasp, Hold::push, Hold::slide}) {
+    at(next, Hold::free) += released * at(probability_, hold);
+    at(next, hold) -= released * at(probability_, hold);
+  }
+  const double touched = changed(parameters.touch_per_s) * probability(Hold::free);
+  at(next, Hold::free) -= touched;
+  if (grip_ != Grip::push) at(next, Hold::grasp) += grip_ == Grip::grasp ? touched : 0.5 * touched;
+  if (grip_ != Grip::grasp) at(next, Hold::push) += grip_ == Grip::push ? touched : 0.5 * touched;
+  const double to_slide = slips * at(next, Hold::push), to_push = sticks * at(next, Hold::slide);
+  at(next, Hold::push) += to_push - to_slide;
+  at(next, Hold::slide) += to_slide - to_push;
+  probability_ = next;
+}
+
+void HoldFilter::update(const ByHold& log_likelihood) {
+  double max = -INFINITY;
+  for (size_t h = 0; h < kHolds; ++h)
+    if (allows(static_cast<Hold>(h))) max = std::max(max, log_likelihood[h]);
+  double sum = 0;
+  for (size_t h = 0; h < kHolds; ++h) {
+    const bool allowed = allows(static_cast<Hold>(h));
+    const double prior = allowed ? std::max(probability_[h], kMinProbability) : 0;
+    probability_[h] = allowed ? prior * std::exp(log_likelihood[h] - max) : 0;
+    sum += probability_[h];
+  }
+  for (double& p : probability_) p /= sum;
+}
+
+void HoldFilter::touch(double probability) {
+  probability_ = {1 - probability, 0, 0, 0};
+  if (grip_ == Grip::grasp) {
+    at(probability_, Hold::grasp) = probability;
+  } else if (grip_ == Grip::push) {
+    at(probability_, Hold::push) = probability;
+  } else {
+    at(probability_, Hold::grasp) = at(probability_, Hold::push) = 0.5 * probability;
+  }
+}
+
+void HoldFilter::release() {
+  probability_ = {1, 0, 0, 0};
+}
+
+Hold HoldFilter::most_probable() const {
+  if (probability(Hold::free) > 0.5) return Hold::free;
+  const double grasp = probability(Hold::grasp), push = probability(Hold::push), slide = probability(Hold::slide);
+  if (slide > std::max(grasp, push)) return Hold::slide;
+  constexpr double kTold = 2;  // ratio of probabilities that changes the answer
+  if (last_grip_ == Hold::grasp && push > kTold * grasp) last_grip_ = Hold::push;
+  if (last_grip_ == Hold::push && grasp > kTold * push) last_grip_ = Hold::grasp;
+  return last_grip_;
+}
+
+TouchEvidence touch_evidence(const FreeTip& tip, double seconds, const InferenceParameters& parameters) {
+  const double gap_deviation_mm = std::hypot(tip.gap_deviation_mm, parameters.gap_mm);
+  const auto step_within = [&tip, seconds](double mm_per_s) {
+    const double mm = mm_per_s * seconds;
+    return log_normal(tip.step_mm, tip.step_covariance_mm2 + mm * mm * Mat3::Identity());
+  };
+  const double moving = step_within(parameters.hand_mm_per_s), resting = step_within(parameters.resting_mm_per_s);
+  const double if_free = moving + log_normal_cdf(tip.gap_mm / gap_deviation_mm) - std::log(parameters.free_space_mm);
+  const double noticed = std::log1p(-parameters.unnoticed) + resting + log_normal(tip.gap_mm, gap_deviation_mm);
+  // Anywhere inside, blurred by how well the surface is known.
+  const double inside = log_normal_cdf(-tip.gap_mm / gap_deviation_mm) +
+                        log_normal_cdf((tip.gap_mm + parameters.inside_mm) / gap_deviation_mm);
+  const double unnoticed = std::log(parameters.unnoticed) + moving + inside - std::log(parameters.inside_mm);
+  return {log_sum(noticed, unnoticed) - if_free, unnoticed > noticed};
+}
+
+double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, const Vec3& outward_normal,
+                            double friction) {
+  const double pressed_N = -force_N.dot(outward_normal);
+  const Vec3 tangential_N = force_N + pressed_N * outward_normal;
+  const double deviation_N = std::sqrt(std::max(outward_normal.dot(covariance_N2 * outward_normal), 1e-18));
+  const double along_N = tangential_N.norm();
+  const Vec3 direction = along_N > 0 ? Vec3(tangential_N / along_N) : outward_normal.unitOrthogonal();
+  const double cone_deviation_N =
+      std::sqrt(std::max(direction.dot(covariance_N2 * direction), 1e-18) + std::pow(friction * deviation_N, 2) +
+                std::pow(kFrictionDeviationRatio * friction * std::max(pressed_N, 0.0), 2));
+  const double log_probability = log_normal_cdf(pressed_N / deviation_N) +
+                                 log_normal_cdf((friction * std::max(pressed_N, 0.0) - along_N) / cone_deviation_N);
+  return std::min(0.0, log_probability - 2 * std::log(0.5));
+}
+
+}  // namespace palpate

@@ -1,0 +1,44 @@
+#include "palpate/infer/inference_parameters.h"
+
+namespace palpate {
+
+void describe(Settings& settings, InferenceParameters& p) {
+  const Range positive{0, 1e6, true, false}, probability{0, 1, true, true};
+  settings.number("point_px", p.point_px, positive, "deviation of a tracked point in one camera");
+  settings.number("point_dof", p.point_dof, positive, "Student-t degrees of freedom of a point");
+  settings.number("effective_points", p.effective_points, positive, "effective sample size of a frame's points");
+  settings.number("motion_error", p.motion_error, {0, 10}, "error of the model's motion of a point, ratio to it");
+  settings.number("tip_floor_mm", p.tip_floor_mm, positive, "min. deviation of the tip's displacement");
+  settings.number("tip_disparity_px", p.tip_disparity_px, positive, "the same along the viewing ray, of the disparity");
+  settings.number("tip_dof", p.tip_dof, positive, "Student-t degrees of freedom of the tip");
+  settings.number("excluded_radii", p.excluded_radii, positive, "points nearer to a patch are left out");
+  settings.number("scene_mm", p.scene_mm, positive, "prior of the scene's translation");
+  settings.number("scene_rad", p.scene_rad, positive, "prior of the scene's rotation");
+  settings.number("scene_walk_mm", p.scene_walk_mm, positive, "random walk of the translation, mm per sqrt(s)");
+  settings.number("scene_walk_rad", p.scene_walk_rad, positive, "random walk of the rotation, rad per sqrt(s)");
+  settings.number("disparity_bias_px", p.disparity_bias_px, positive, "prior of the disparity's common bias");
+  settings.number("hand_mm_per_s", p.hand_mm_per_s, positive, "speed of a hand");
+  settings.number("log_radius", p.log_radius, positive, "prior of the log of the footprint radius");
+  settings.number("min_radius_ratio", p.min_radius_ratio, probability, "smallest radius over the stated one");
+  settings.number("max_radius_ratio", p.max_radius_ratio, {1, 100}, "largest radius over the stated one");
+  settings.number("offset_mm", p.offset_mm, positive, "prior of measured tip minus middle of the patch, each axis");
+  settings.number("touch_mm", p.touch_mm, positive, "displacement of the patch in the frame of onset");
+  settings.number("stated_radius", p.stated_radius, positive, "the same where the stated radius is right (Cauchy)");
+  settings.number("gain", p.gain, positive, "prior of the common error of the model's motion, ratio to it");
+  settings.number("tissue_radius", p.tissue_radius, positive, "error of the log radius that the tissue tells");
+  settings.number("offset_walk_mm", p.offset_walk_mm, {0, 100}, "random walk of the offset, mm per sqrt(s)");
+  settings.number("log_radius_walk", p.log_radius_walk, {0, 100}, "random walk of the log radius per sqrt(s)");
+  settings.number("telling_force", p.telling_force, {0, 1000}, "the radius is learned at so many deviations of force");
+  settings.number("touch_per_s", p.touch_per_s, positive, "rate at which a free tip begins to touch");
+  settings.number("release_per_s", p.release_per_s, positive, "rate at which a tip releases the tissue");
+  settings.number("slip_per_s", p.slip_per_s, positive, "rate at which a push begins to slide");
+  settings.number("stick_per_s", p.stick_per_s, positive, "rate at which a slide ends");
+  settings.number("free_space_mm", p.free_space_mm, positive, "a free tip is anywhere within so much of the surface");
+  settings.number("gap_mm", p.gap_mm, positive, "surface against tip where they touch");
+  settings.number("resting_mm_per_s", p.resting_mm_per_s, positive, "speed of a tip that has touched");
+  settings.number("unnoticed", p.unnoticed, probability, "probability that a touch begins unnoticed");
+  settings.number("inside_mm", p.inside_mm, positive, "how deep such a tip may be");
+  settings.number("model_error", p.model_error, {0, 10}, "of the force, ratio to it: what the model's form leaves");
+}
+
+}  // namespace palpate

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "palpate/contact/contact_model.h"
+#include "palpate/infer/map_estimate.h"
+#include "palpate/observe/tissue_tracker.h"
+
+namespace palpate {
+
+/// A point of the tissue as a place of the body's surface.
+struct SurfacePlace {
+  Triangle nodes = {};
+  Vec3 barycentric = Vec3::Zero();
+  bool on_body = false;  ///< near enough to the surface to move with it
+};
+
+/// The place of each point on the body.
+std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, const std::vector<Vec3>& nodes_mm,
+                                    const std::vector<Triangle>& boundary);
+
+/// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.
+struct PredictedBody {
+  const ContactResponse* response = nullptr;
+  const std::vector<SurfacePlace>* places = nullptr;  ///< by number of the point
+  Eigen::VectorXd x0;                                 ///< unknowns at which the response was computed
+  Vec3 about_mm = Vec3::Zero();                       ///< of the scene's motion
+
+  /// Displacement of a point at x0, mm; the part of it that one contact makes, to first order.
+  Vec3 displacement_mm(const TissuePoint& point) const;
+  Vec3 displacement_by_mm(const TissuePoint& point, size_t contact) const;
+};
+
+/// Left x, left y and disparity of a rectified point; its derivative by the point, left camera frame.
+struct StereoProjection {
+  Vec3 px;
+  Mat3 per_mm;
+};
+StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm);
+
+/// Tissue points in both cameras: z = pi(S (X + u)) - pi(X) + bias, px.
+std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& seen, const PredictedBody& body,
+                                             const Rectification& rectification, const InferenceParameters& parameters);
+
+/// Covariance of the displacement of a tip that no tracker knows better than this, mm2: far less sure along the viewing
+/// ray than across it.
+Mat3 tip_floor_covariance_mm2(const Vec3& tip_mm, const Rectification& rectification,
+                              const InferenceParameters& parameters);
+
+/// The tip: z = S (X_c + q + offset), mm. `center_mm`: of the patch at rest.
+Measurement tip_measurement(const Vec3& tip_mm, const Mat3& covariance_mm2, size_t contact, const Vec3& center_mm,
+                            const PredictedBody& body, const Rectification& rectification,
+                            const InferenceParameters& parameters);
+
+/// Motion expected of every point, px, for the tracker's search.
+std::vector<Vec3> expected_motion_px(const std::vector<TissuePoint>& points, const PredictedBody& body,
+                                     const Rectification& rectification);
+
+}  // namespace palpate

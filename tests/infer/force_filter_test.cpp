@@ -1,0 +1,193 @@
+#include "palpate/infer/force_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "palpate/infer/measurement.h"
+#include "palpate/volume/tetrahedralize.h"
+#include "tests/support/meshes.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kTrueRadius_mm = 4, kSeconds = 0.04;
+const TissueOptions kTissue{Law::saint_venant_kirchhoff, 27, 0.4, ""};
+const Vec3 kDepth_mm(-30, -30, 100), kPlace_mm = Vec3(30, 30, 0) + kDepth_mm;
+
+Rectification da_vinci() {
+  Rectification r;
+  r.size = {960, 540};
+  r.focal_px = 700;
+  r.principal_x_px = 480;
+  r.principal_y_px = 270;
+  r.baseline_mm = 5;
+  r.identity = true;
+  return r;
+}
+
+AttachedMesh slab(const std::vector<Vec3>& places_mm) {
+  TetMesh mesh = test::box_mesh({60, 60, 20}, {10, 10, 4});
+  const std::vector<int> fixed_before = test::nodes_at(mesh, 2, 20);
+  for (Vec3& node : mesh.nodes_mm) node += kDepth_mm;
+  for (const Vec3& place_mm : places_mm) mesh = refine_near(mesh, place_mm, 6, 3);
+  std::vector<int> fixed;
+  for (size_t i = 0; i < mesh.nodes_mm.size(); ++i)
+    if (mesh.nodes_mm[i].z() > kDepth_mm.z() + 19.99) fixed.push_back(static_cast<int>(i));
+  return {std::move(mesh), fixed};
+}
+
+std::vector<TissuePoint> grid_of_points() {
+  std::vector<TissuePoint> points;
+  for (int i = 2; i < 19; ++i)
+    for (int j = 2; j < 19; ++j) {
+      TissuePoint point;
+      point.number = static_cast<int>(points.size());
+      point.rest_mm = Vec3(3.0 * i, 3.0 * j, 0) + kDepth_mm;
+      points.push_back(point);
+    }
+  return points;
+}
+
+/// Tissue that is held by a patch of the true radius, in a scene that breathes, seen with noise.
+class Made {
+ public:
+  Made() : truth_(slab, kTissue, Element::averaged), points_(grid_of_points()) {
+    truth_.begin(kPlace_mm, kTrueRadius_mm);
+    places_ = places_of(points_, truth_.model().rest_mm(), truth_.boundary());
+  }
+
+  const std::vector<TissuePoint>& points() const { return points_; }
+
+  /// q of the true patch; `scene` moves everything.
+  FrameEvidence frame(int index, const Vec3& q_mm, const Vec3& scene_mm, bool held, bool tip_seen = true) {
+    FrameEvidence frame;
+    frame.time_s = kSeconds * index;
+    equilibrium_ = truth_.solve({held ? q_mm : Vec3::Zero()});
+    std::normal_distribution<double> noise(0, 0.05);
+    for (TissuePoint point : points_) {
+      const SurfacePlace& place = places_[static_cast<size_t>(point.number)];
+      Vec3 u = Vec3::Zero();
+      for (size_t c = 0; c < 3; ++c)
+        u += place.barycentric[static_cast<int>(c)] * equilibrium_.u.segment<3>(3 * place.nodes[c]);
+      point.motion_px = project_stereo(rig_, point.rest_mm + u + scene_mm).px - project_stereo(rig_, point.rest_mm).px +
+                        Vec3(noise(random_), noise(random_), noise(random_));
+      frame.tissue.push_back(point);
+    }
+    frame.tips.resize(kMostInstruments);
+    TipObservation& tip = frame.tips[0];
+    tip.visible = tip_seen;
+    tip.tip_mm = kPlace_mm + q_mm + scene_mm + 0.3 * Vec3(noise(random_), noise(random_), noise(random_));
+    tip.covariance_mm2 = 0.04 * Mat3::Identity();
+    if (marked_) {
+      tip.since_mark_mm = tip.tip_mm - *marked_;
+      tip.since_mark_covariance_mm2 = 4e-4 * Mat3::Identity();
+    }
+    return frame;
+  }
+
+  void mark(const FrameEvidence& frame) { marked_ = frame.tips[0].tip_mm; }
+  Vec3 force_N() const { return equilibrium_.force_N; }
+
+ private:
+  Rectification rig_ = da_vinci();
+  ContactModel truth_;
+  std::vector<TissuePoint> points_;
+  std::vector<SurfacePlace> places_;
+  Equilibrium equilibrium_;
+  std::mt19937 random_{7};
+  std::optional<Vec3> marked_;
+};
+
+struct PullRun {
+  double worst_error_N = 0, peak_N = 0;
+  FrameAnswer last;
+};
+
+/// Comes down in 12 frames, takes hold, pulls by 3 mm in 12 and stays for 6.
+PullRun pull(Made& made, ForceFilter& filter, double breath_mm, int hidden_from = 1000, int hidden_to = 1000) {
+  PullRun run;
+  for (int i = 0; i < 31; ++i) {
+    const Vec3 scene_mm = breath_mm * std::sin(0.1 * i) * Vec3(0.3, 0.8, 0.5);
+    const double height_mm = i < 12 ? 0.15 * (12 - i) * (12 - i) : 0;
+    const double pulled_mm = 3 * std::clamp((i - 13) / 12.0, 0.0, 1.0);
+    const bool is_held = i >= 12;
+    const Vec3 q_mm(0.2 * pulled_mm, 0, -height_mm - pulled_mm);
+    const FrameEvidence frame = made.frame(i, q_mm, scene_mm, is_held, i < hidden_from || i >= hidden_to);
+    run.last = filter.update(frame);
+    if (run.last.instruments[0].begins) made.mark(frame);
+    const Vec3 truth_N = is_held ? made.force_N() : Vec3::Zero();
+    run.peak_N = std::max(run.peak_N, truth_N.norm());
+    if (i >= 17) run.worst_error_N = std::max(run.worst_error_N, (run.last.instruments[0].force_N - truth_N).norm());
+  }
+  return run;
+}
+
+ForceFilter filter_for(const Made& made, double stated_radius_mm, Drive drive = Drive::fused) {
+  ContactOptions contact;
+  contact.footprint_radius_mm = stated_radius_mm;
+  contact.grip = Grip::grasp;
+  contact.drive = drive;
+  return ForceFilter(ContactModel(slab, kTissue, Element::averaged), slab({}), made.points(), da_vinci(), contact);
+}
+
+TEST(ForceFilter, FindsTheForceOfAPull) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  const PullRun run = pull(made, filter, 0);
+  EXPECT_GT(run.peak_N, 0.3);
+  EXPECT_LT(run.worst_error_N, 0.08 * run.peak_N);
+  EXPECT_EQ(run.last.instruments[0].hold, Hold::grasp);
+}
+
+TEST(ForceFilter, FindsItAlsoWhenTheRadiusIsToldAtHalfOrTwice) {
+  for (const double ratio : {0.5, 2.0}) {
+    Made made;
+    ForceFilter filter = filter_for(made, ratio * kTrueRadius_mm);
+    const PullRun run = pull(made, filter, 0);
+    EXPECT_LT(run.worst_error_N, 0.15 * run.peak_N) << ratio;
+    Made again;
+    ForceFilter by_tip = filter_for(again, ratio * kTrueRadius_mm, Drive::tip);
+    EXPECT_GT(pull(again, by_tip, 0).worst_error_N, 0.25 * run.peak_N) << ratio;
+  }
+}
+
+TEST(ForceFilter, AScenesMotionIsNoForce) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  const PullRun run = pull(made, filter, 4);
+  EXPECT_LT(run.worst_error_N, 0.08 * run.peak_N);
+  EXPECT_GT(run.last.scene.translation_mm.norm(), 0.4);
+}
+
+TEST(ForceFilter, TheTissueTellsTheForceWhileTheTipIsHidden) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  const PullRun run = pull(made, filter, 0, 22, 31);
+  EXPECT_LT(run.worst_error_N, 0.12 * run.peak_N);
+  EXPECT_TRUE(run.last.instruments[0].tip_inferred);
+}
+
+TEST(ForceFilter, ReleasedTissueIsSeenAtOnce) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  pull(made, filter, 0);
+  const Vec3 q_mm(0.6, 0, -3);
+  for (int i = 31; i < 34; ++i) {
+    const FrameAnswer answer = filter.update(made.frame(i, q_mm, Vec3::Zero(), false));
+    EXPECT_EQ(answer.instruments[0].hold, Hold::free) << i;
+    EXPECT_EQ(answer.instruments[0].force_N.norm(), 0) << i;
+  }
+}
+
+TEST(ForceFilter, AHoveringTipTouchesNothing) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  for (int i = 0; i < 30; ++i) {
+    const Vec3 q_mm(0.2 * i, 0, -3 - std::cos(0.3 * i));
+    EXPECT_EQ(filter.update(made.frame(i, q_mm, Vec3::Zero(), false)).instruments[0].hold, Hold::free) << i;
+  }
+}
+
+}  // namespace
+}  // namespace palpate

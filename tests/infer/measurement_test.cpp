@@ -1,0 +1,64 @@
+#include "palpate/infer/measurement.h"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+Rectification turned_rig() {
+  Rectification r;
+  r.size = {960, 540};
+  r.focal_px = 700;
+  r.principal_x_px = 470;
+  r.principal_y_px = 280;
+  r.baseline_mm = 5;
+  const SceneMotion turn{Vec3::Zero(), {0.02, -0.03, 0.01}, Vec3::Zero()};
+  r.rectified_from_left = turn.rotation();
+  return r;
+}
+
+TEST(Measurement, TheDerivativeOfTheProjectionIsThatOfFiniteDifferences) {
+  const Rectification rig = turned_rig();
+  const Vec3 point(12, -9, 95);
+  const StereoProjection at = project_stereo(rig, point);
+  constexpr double kStep_mm = 1e-4;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 step = kStep_mm * Vec3::Unit(axis);
+    const Vec3 per_mm = (project_stereo(rig, point + step).px - project_stereo(rig, point - step).px) / (2 * kStep_mm);
+    EXPECT_LT((per_mm - at.per_mm.col(axis)).norm(), 1e-5) << axis;
+  }
+  EXPECT_NEAR(at.px.z(), rig.disparity_px(rectified_depth_mm(rig, point)), 1e-9);
+}
+
+TEST(Measurement, TheDerivativesByTheScenesMotionAreThoseOfFiniteDifferences) {
+  const Rectification rig = turned_rig();
+  const InferenceParameters parameters;
+  TissuePoint point;
+  point.rest_mm = {12, -9, 95};
+  const Vec3 about_mm(0, 0, 100);
+  Eigen::VectorXd x0 = Eigen::VectorXd::Zero(Unknowns::kScene);
+  x0.head<6>() << 0.5, -1, 2, 0.01, -0.02, 0.005;
+  const auto residual = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return tissue_measurements({point}, {nullptr, nullptr, x, about_mm}, rig, parameters)[0].residual;
+  };
+  const Measurement m = tissue_measurements({point}, {nullptr, nullptr, x0, about_mm}, rig, parameters)[0];
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < Unknowns::kScene; ++i) {
+    Eigen::VectorXd more = x0, less = x0;
+    more[i] += kStep, less[i] -= kStep;
+    const Eigen::VectorXd per_unknown = -(residual(more) - residual(less)) / (2 * kStep);
+    EXPECT_LT((per_unknown - m.H.col(i)).norm(), 0.02 * per_unknown.norm() + 1e-6) << i;
+  }
+}
+
+TEST(Measurement, ATipIsLessSureAlongTheViewingRay) {
+  const InferenceParameters parameters;
+  const Rectification rig = turned_rig();
+  const Vec3 tip_mm(0, 0, 100);
+  const Mat3 covariance = tip_floor_covariance_mm2(tip_mm, rig, parameters);
+  EXPECT_GT(covariance(2, 2), covariance(0, 0));
+  EXPECT_GT(tip_floor_covariance_mm2({0, 0, 200}, rig, parameters)(2, 2), covariance(2, 2));
+}
+
+}  // namespace
+}  // namespace palpate
