@@ -20,7 +20,7 @@ const std::vector<CalibrationKind>& registry() {
        {"t_cn_cnm1"}},
       {{"SCARED frame data", "SCARED (`frame_data.json`, `endoscope_calibration.yaml`)", "KL KR DL DR R T"},
        {"camera-calibration"}},
-      {{"StereoMIS calibration", "StereoMIS (`StereoCalibration.ini`, `camcal.json`)",
+      {{"StereoMIS calibration", "StereoMIS (`StereoCalibration.ini`)",
         "fc_x, cc_x, kc_0 ..., R_0 ..., T_0 ... of StereoLeft and StereoRight"},
        {"stereoleft", "stereoright"}},
       {{"Hamlyn text files", "Hamlyn Centre (a folder of text files with bare numbers)",
