@@ -5,6 +5,7 @@
 #include <string>
 
 #include "app/answer.h"
+#include "app/document_inputs.h"
 #include "app/runtime.h"
 #include "app/scene_file.h"
 #include "app/verbs.h"
@@ -39,8 +40,9 @@ int main(int argc, char** argv) {
   program.footer(
       "Exit codes: 0 done, 2 wrong use, 3 bad input, 4 could not finish (what was done is kept), 1 our bug.\n"
       "Example: palpate demo -o demo");
-  bool document_scene = false;
+  bool document_scene = false, document_inputs = false;
   program.add_flag("--document-scene", document_scene, "print every key of scene.yaml as a Markdown table");
+  program.add_flag("--document-inputs", document_inputs, "print what is read, and from which tool, as docs/inputs.md");
   app::add_demo(program);
   app::add_simulate(program);
   app::add_map(program);
@@ -54,6 +56,8 @@ int main(int argc, char** argv) {
     program.parse(argc, argv);
     if (document_scene) {
       fmt::print("{}", app::document_scene_file());
+    } else if (document_inputs) {
+      fmt::print("{}", app::document_inputs());
     } else if (program.get_subcommands().empty()) {
       fmt::print(stderr, "{}", program.help());
       return app::kWrongUse;

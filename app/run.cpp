@@ -11,6 +11,7 @@
 #include "app/answer.h"
 #include "app/output_folder.h"
 #include "app/progress.h"
+#include "app/recording_check.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/mesh_files.h"
@@ -243,7 +244,7 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
   const auto opened = [&](const std::string& key, const auto& stage) { return in_scene(scene_file, key, stage); };
   Recording recording = opened("recording", [&] { return Recording(scene.recording); });
   const StereoRig rig = opened("recording.calibration", [&] {
-    StereoRig read = read_rig(scene.recording.calibration, scene.recording.translation_unit);
+    StereoRig read = read_rig(scene.recording);
     check_rig_fits(read, recording.size());
     return read;
   });
@@ -251,6 +252,10 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
     opened("instrument.track", [&] { return read_tip_track(scene.instrument.track); });
   if (!quiet) fmt::print(stderr, "calibration {}\n", describe_rig(rig, recording.size()));
   BuiltMap built;
+  built.timing = recording.timing();
+  built.notes = recording.notes();
+  built.notes.insert(built.notes.end(), rig.notes.begin(), rig.notes.end());
+  if (!quiet) fmt::print(stderr, "{}", describe_input(built.timing, built.notes));
   built.fps = recording.fps();
   built.frame_count = recording.frame_count();
   built.rectification = make_rectification(rig, recording.size());
@@ -259,12 +264,17 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
     std::optional<StereoFrame> frame = recording.next();
     std::vector<StereoFrame> static_frames;
     while (frame && frame->index < scene.map.frame) {
-      if (frame->index >= scene.map.first_frame()) static_frames.push_back(*frame);
+      if (frame->index >= scene.map.first_frame() && !frame->right.empty()) static_frames.push_back(*frame);
       frame = recording.next();
     }
     if (!frame)
       throw BadInput(
           fmt::format("map.frame is {}, but the recording has only {} frames", scene.map.frame, built.frame_count));
+    if (frame->right.empty())
+      throw BadInput(
+          fmt::format("map.frame is {}, but the right camera shows nothing of that time, expected a frame that "
+                      "both have",
+                      scene.map.frame));
     built.frame = *frame;
     static_frames.push_back(built.frame);
     built.map = build_tissue_map(static_frames, built.rectification, scene.map, scene.tissue, scene.attachments);

@@ -38,6 +38,8 @@ struct RunSummary {
 struct BuiltMap {
   double fps = 0;
   int frame_count = -1;  ///< -1 = unknown
+  RecordingTiming timing;
+  std::vector<std::string> notes;  ///< sentences on recording and calibration that a user ought to know
   StereoFrame frame;
   Rectification rectification;
   TissueMap map;

@@ -17,21 +17,29 @@ namespace palpate::app {
 
 namespace {
 
-using SeenTips = std::array<std::vector<SeenTip>, kMostInstruments>;
+/// Tips of one instrument, and the number of the frame that each was seen in.
+struct SeenTips {
+  std::vector<SeenTip> tips;
+  std::vector<int> frames;
+};
+using TipsOfAll = std::array<SeenTips, kMostInstruments>;
 
-SeenTips tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
+TipsOfAll tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
   InstrumentOptions from_images = scene.instrument;
   from_images.track.clear();
   from_images.track_2.clear();
   const Rectification& rectification = built.rectification;
   InstrumentTracker tracker(from_images, rectification, rectify(rectification, built.frame), built.map.organ_mask);
-  SeenTips seen;
+  TipsOfAll seen;
   Recording recording(scene.recording);
   Progress progress("track", quiet);
   while (auto frame = recording.next()) {
     const InstrumentObservations observed = tracker.update(rectify(rectification, *frame));
-    for (size_t i = 0; i < kMostInstruments; ++i)
-      if (observed.tips[i].visible) seen[i].push_back({frame->time_s, observed.tips[i].tip_mm});
+    for (size_t i = 0; i < kMostInstruments; ++i) {
+      if (!observed.tips[i].visible) continue;
+      seen[i].tips.push_back({frame->time_s, observed.tips[i].tip_mm});
+      seen[i].frames.push_back(frame->index);
+    }
     progress.show(frame->index + 1, recording.frame_count(), "");
     if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
   }
@@ -39,15 +47,16 @@ SeenTips tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
 }
 
 /// With the axes and the clock that the scene states.
-void compare_as_stated(const std::vector<SeenTip>& seen, const TipTrack& track, const InstrumentOptions& options,
-                       double fps, TrackCheck& check) {
+void compare_as_stated(const SeenTips& seen, const TipTrack& track, const InstrumentOptions& options,
+                       TrackCheck& check) {
   double squared = 0;
   int frames = 0;
-  for (const SeenTip& tip : seen) {
+  for (size_t i = 0; i < seen.tips.size(); ++i) {
+    const SeenTip& tip = seen.tips[i];
     std::optional<TipTrack::Row> row;
     if (options.time_offset_s != 0)
       row = row_at(track, tip.time_s + options.time_offset_s);
-    else if (const auto at = track.rows.find(static_cast<int>(std::lround(tip.time_s * fps))); at != track.rows.end())
+    else if (const auto at = track.rows.find(seen.frames[i]); at != track.rows.end())
       row = at->second;
     if (!row) continue;
     squared += (options.camera_from_robot(row->tip_mm) - tip.tip_mm).squaredNorm();
@@ -66,16 +75,16 @@ std::string yaml_of(const Vec3& v, const char* format) {
 TrackCheck check_track(const SceneFile& scene_file, const BuiltMap& built, bool quiet) {
   const InstrumentOptions& options = scene_file.scene.instrument;
   const TipTrack track = read_tip_track(options.track);
-  const SeenTips seen = tips_in_video(scene_file.scene, built, quiet);
+  const TipsOfAll seen = tips_in_video(scene_file.scene, built, quiet);
   TrackCheck check;
   // The track may be that of either instrument in view.
-  for (const std::vector<SeenTip>& tips : seen) {
-    if (tips.empty() && &tips != &seen.front()) continue;
+  for (const SeenTips& of_one : seen) {
+    if (of_one.tips.empty() && &of_one != &seen.front()) continue;
     try {
-      const HandEye found = estimate_hand_eye(tips, track);
+      const HandEye found = estimate_hand_eye(of_one.tips, track);
       if (check.found && check.found->rms_mm <= found.rms_mm) continue;
       check.found = found;
-      compare_as_stated(tips, track, options, built.fps, check);
+      compare_as_stated(of_one, track, options, check);
     } catch (const BadInput& reason) {
       if (check.why_not.empty()) check.why_not = reason.what();
     }

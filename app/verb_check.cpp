@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
+#include "app/recording_check.h"
 #include "app/run.h"
 #include "app/track_check.h"
 #include "app/verbs.h"
@@ -34,6 +35,7 @@ nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& buil
   json["scene"] = scene_file.file.string();
   json["recording"] = {{"image_size_px", {size.width, size.height}}, {"fps", built.fps}};
   json["recording"]["frames"] = built.frame_count >= 0 ? nlohmann::ordered_json(built.frame_count) : nullptr;
+  json["recording"].update(timing_json(built.timing, built.notes));
   json["calibration"] = {
       {"focal_px", rig.left.K(0, 0)}, {"baseline_mm", rig.baseline_mm()}, {"field_of_view_deg", {field.x, field.y}}};
   json["tissue"] = tissue_json(scene_file.scene.tissue);

@@ -29,8 +29,9 @@ void add_compare(CLI::App& app) {
   verb->footer("Example: palpate compare results/forces.csv truth.csv");
   verb->callback([arguments] {
     if (!arguments->sensor.empty()) {
-      const SensorComparison found =
-          compare_with_sensor(read_forces(arguments->forces), read_sensor_log(arguments->sensor));
+      const std::vector<ForceRow> forces = read_forces(arguments->forces);
+      const double span_s = forces.empty() ? 0 : forces.back().time_s - forces.front().time_s;
+      const SensorComparison found = compare_with_sensor(forces, read_sensor_log(arguments->sensor, span_s));
       fmt::print("{}", arguments->json ? json_success(nlohmann::ordered_json::parse(to_json(found))) : to_text(found));
       return;
     }

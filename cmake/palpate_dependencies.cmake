@@ -7,11 +7,19 @@ find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(CGAL REQUIRED)
+find_package(Boost REQUIRED)
 
 # Each package as one imported target whose headers are system headers (their warnings are not ours).
 add_library(palpate_opencv INTERFACE)
 target_include_directories(palpate_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(palpate_opencv INTERFACE ${OpenCV_LIBS})
+
+# FFmpeg's own libraries tell the time of every frame; OpenCV's VideoCapture does not.
+find_package(PkgConfig REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(LibLZMA REQUIRED)
+pkg_check_modules(LZ4 REQUIRED IMPORTED_TARGET liblz4)
+pkg_check_modules(LIBAV REQUIRED IMPORTED_TARGET libavformat libavcodec libswscale libavutil)
 
 find_path(SUITESPARSE_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)

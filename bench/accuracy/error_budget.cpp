@@ -6,7 +6,7 @@
 #include <map>
 
 #include "palpate/core/errors.h"
-#include "palpate/feedback/csv_table.h"
+#include "palpate/core/table.h"
 
 namespace palpate {
 
@@ -62,9 +62,9 @@ TipFigures tip_figures(const std::vector<ForceRow>& estimate, const std::vector<
 }
 
 std::vector<bool> read_visible(const std::filesystem::path& truth_file) {
-  const CsvTable table(truth_file);
+  const Table table(truth_file, {{"frame"}, {"visible"}});
   std::vector<bool> visible;
-  for (const CsvTable::Row& row : table.rows())
+  for (const Table::Row& row : table.rows())
     visible.push_back(!table.has("visible") || table.number(row, "visible") != 0);
   return visible;
 }

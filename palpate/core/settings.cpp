@@ -285,6 +285,20 @@ void Settings::pixel(const std::string& key, cv::Point2d& field, const std::stri
   entries_.push_back(std::move(entry));
 }
 
+void Settings::rectangle(const std::string& key, cv::Rect2d& field, const std::string& doc) {
+  auto entry = std::make_unique<Entry>();
+  entry->key = key;
+  entry->doc = doc;
+  entry->range = "[x, y, width, height]";
+  entry->read = [&field](const YAML::Node& node, const SettingsContext&, const std::string& place, const std::string&) {
+    const std::vector<double> values = numbers_of(node, 4, place, {0, 1e5});
+    field = {values[0], values[1], values[2], values[3]};
+  };
+  entry->write = [&field] { return flow(std::vector<double>{field.x, field.y, field.width, field.height}); };
+  entry->default_text = entry->write();
+  entries_.push_back(std::move(entry));
+}
+
 void Settings::polygon(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;

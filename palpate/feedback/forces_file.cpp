@@ -4,9 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "palpate/core/errors.h"
-#include "palpate/feedback/csv_table.h"
+#include "palpate/core/table.h"
 
 namespace palpate {
 namespace {
@@ -15,6 +16,13 @@ constexpr const char* kHeader =
     "frame,time_s,status,in_contact,fx_N,fy_N,fz_N,force_N,mean_nodal_force_N,tip_x_mm,tip_y_mm,tip_z_mm,"
     "max_von_mises_kPa,residual,frame_ms,misfit_mm,warnings,force_low_N,force_high_N,force_low_total_N,"
     "force_high_total_N,grip,p_contact,footprint_mm,scene_x_mm,scene_y_mm,scene_z_mm";
+
+std::vector<TableColumn> forces_columns() {
+  std::vector<TableColumn> columns;
+  std::stringstream names(std::string(kHeader) + ",visible");
+  for (std::string name; std::getline(names, name, ',');) columns.push_back({name});
+  return columns;
+}
 
 /// Written for a residual that is not finite: far above every tolerance, still a number.
 constexpr double kUnboundedResidual = 1e6;
@@ -37,7 +45,7 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 /// Frames are numbered; a row without its number belongs to none.
-int frame_of(const CsvTable& table, const CsvTable::Row& row, const std::filesystem::path& file) {
+int frame_of(const Table& table, const Table::Row& row, const std::filesystem::path& file) {
   const double frame = table.number(row, "frame");
   if (!(std::abs(frame) < std::numeric_limits<int>::max()))
     throw BadInput(fmt::format("{}, line {}: column frame is \"{}\", expected a number", file.string(), row.line,
@@ -45,7 +53,7 @@ int frame_of(const CsvTable& table, const CsvTable::Row& row, const std::filesys
   return static_cast<int>(frame);
 }
 
-ForceRow parse_row(const CsvTable& table, const CsvTable::Row& line, const std::filesystem::path& file) {
+ForceRow parse_row(const Table& table, const Table::Row& line, const std::filesystem::path& file) {
   const auto number = [&](const char* column) { return table.number(line, column); };
   const auto vector = [&](const char* x, const char* y, const char* z) {
     return Vec3(number(x), number(y), number(z));
@@ -138,12 +146,10 @@ void SecondForcesWriter::write(const ForceEstimate& estimate) {
 }
 
 std::vector<ForceRow> read_forces(const std::filesystem::path& file) {
-  const CsvTable table(file);
-  for (const char* name : {"frame", "force_N"})
-    if (!table.has(name))
-      throw BadInput(fmt::format("{}: column {} is missing, expected a table of forces", file.string(), name));
+  const Table table(file, forces_columns());
+  table.require({"frame", "force_N"});
   std::vector<ForceRow> rows;
-  for (const CsvTable::Row& row : table.rows()) rows.push_back(parse_row(table, row, file));
+  for (const Table::Row& row : table.rows()) rows.push_back(parse_row(table, row, file));
   return rows;
 }
 

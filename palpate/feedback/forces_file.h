@@ -73,7 +73,7 @@ class SecondForcesWriter {
   std::vector<ForceRow> rows_;
 };
 
-/// Rows of forces.csv or truth.csv in the order of the file; columns are found by name (CsvTable). frame and force_N
+/// Rows of forces.csv or truth.csv in the order of the file; columns are found by name (Table). frame and force_N
 /// must be there. What is missing, or is no finite number, claims nothing: a force or a tip is NaN then, in_contact
 /// false. Throws BadInput: missing file, missing column, a row without frame number.
 std::vector<ForceRow> read_forces(const std::filesystem::path& file);

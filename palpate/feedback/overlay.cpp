@@ -46,17 +46,16 @@ std::array<Tint, 256> tints_of(const ColourTable& colours, double opacity) {
 
 /// Rectified pixel of every pixel of the left image as recorded.
 cv::Mat rectified_pixels(const Rectification& r, const cv::Size& size) {
-  std::vector<cv::Point2f> recorded, rectified;
+  std::vector<cv::Point2d> recorded;
   recorded.reserve(static_cast<size_t>(size.area()));
   for (int y = 0; y < size.height; ++y)
-    for (int x = 0; x < size.width; ++x) recorded.emplace_back(static_cast<float>(x), static_cast<float>(y));
-  cv::Matx33d rotation;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) rotation(i, j) = r.rectified_from_left(i, j);
-  const cv::Matx33d camera(r.focal_px, 0, r.principal_x_px, 0, r.focal_px, r.principal_y_px, 0, 0, 1);
-  cv::undistortPoints(recorded, rectified, r.rig.left.K, r.rig.left.distortion, rotation, camera);
-  cv::Mat pixels;
-  cv::Mat(rectified).reshape(2, size.height).convertTo(pixels, CV_16SC2);
+    for (int x = 0; x < size.width; ++x) recorded.emplace_back(x, y);
+  cv::Mat pixels(size, CV_16SC2);
+  auto pixel = pixels.begin<cv::Vec2s>();
+  for (const cv::Point2d& place : undistorted(r.rig.left, recorded)) {
+    const cv::Point2d px = project_to_rectified(r, Vec3(place.x, place.y, 1));
+    *pixel++ = cv::Vec2s(cv::saturate_cast<short>(px.x), cv::saturate_cast<short>(px.y));
+  }
   return pixels;
 }
 

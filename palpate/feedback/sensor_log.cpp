@@ -9,23 +9,73 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/core/kabsch.h"
-#include "palpate/feedback/csv_table.h"
+#include "palpate/core/table.h"
+#include "palpate/core/table_text.h"
+#include "palpate/core/time_column.h"
+#include "palpate/core/units.h"
+#include "palpate/feedback/clock_search.h"
 
 namespace palpate {
 
 namespace {
 
 constexpr size_t kFewestReadings = 10;
-/// The delay is searched in steps of this.
-constexpr double kDelayStep_s = 0.005;
+/// The delay is searched in steps of the coarse one everywhere, around the best of those in steps of the fine one.
+constexpr double kCoarseStep_s = 0.02, kFineStep_s = 0.005;
 /// Of the frames, as many have to lie within the sensor's time.
 constexpr double kLeastOverlap = 0.5;
+/// Below, the log shows something else than the video.
+constexpr double kLeastCorrelation = 0.5;
+/// A rate that the file states and its stamps differ by no more than this, or the stamps hold.
+constexpr double kRateTolerance = 0.02;
 
-std::string column_of(const CsvTable& table, const std::filesystem::path& file,
-                      const std::array<std::string, 2>& names) {
-  for (const std::string& name : names)
-    if (table.has(name)) return name;
-  throw BadInput(fmt::format("{}: no column {} (or {})", file.string(), names[0], names[1]));
+std::vector<TableColumn> sensor_columns() {
+  std::vector<TableColumn> columns = time_columns();
+  columns.push_back({"fx_N", {"fx", "force.x", "forcex", "forces.x", "f.x", "xforce", "kraftx", "f0"}});
+  columns.push_back({"fy_N", {"fy", "force.y", "forcey", "forces.y", "f.y", "yforce", "krafty", "f1"}});
+  columns.push_back({"fz_N", {"fz", "force.z", "forcez", "forces.z", "f.z", "zforce", "kraftz", "f2"}});
+  columns.push_back({"sequence", {"rdtsequence"}});
+  return columns;
+}
+
+/// ATI's Net F/T: counts for each N, and the unit behind them, stand before the table.
+double newtons_per_value(const Table& table, const std::vector<SensorReading>& readings) {
+  const auto is_whole = [](const SensorReading& reading) {
+    return reading.force_N == reading.force_N.array().round().matrix();
+  };
+  double factor = 1;
+  if (const auto name = table.before_header({"force", "unit"}); name && table.stated_unit("fx_N").empty())
+    if (const auto unit = unit_of(*name); unit && unit->kind == Unit::Kind::force) factor = unit->factor;
+  const auto counts = table.before_header({"count", "force"});
+  const double per_unit = counts ? number_of(*counts) : 0;
+  if (per_unit > 0 && std::all_of(readings.begin(), readings.end(), is_whole)) factor /= per_unit;
+  return factor;
+}
+
+std::optional<double> stated_rate_Hz(const Table& table) {
+  const auto text = table.before_header({"rate"});
+  const double rate_Hz = text ? number_of(text->substr(0, text->find_first_not_of("0123456789.eE+"))) : 0;
+  return rate_Hz > 0 ? std::optional(rate_Hz) : std::nullopt;
+}
+
+/// By the sensor's own count of its samples where the file states their rate, and the stamps, which the computer puts
+/// on them as they come in, do not say otherwise.
+std::vector<double> clock_of(const Table& table, double video_span_s) {
+  const std::optional<double> rate_Hz = stated_rate_Hz(table);
+  const bool has_stamps = table.has("time_s") || table.has("stamp.secs");
+  std::vector<double> stamps_s;
+  if (has_stamps || !rate_Hz) stamps_s = times_s(table, {video_span_s});
+  if (!rate_Hz || table.rows().size() < kFewestReadings) return stamps_s;
+  std::vector<double> counted_s;
+  for (const Table::Row& row : table.rows())
+    counted_s.push_back(
+        (table.has("sequence") ? table.number(row, "sequence") : static_cast<double>(counted_s.size())) / *rate_Hz);
+  if (stamps_s.empty()) return counted_s;
+  const double stamped = stamps_s.back() - stamps_s.front(), counted = counted_s.back() - counted_s.front();
+  if (!(std::abs(stamped - counted) <= kRateTolerance * stamped)) return stamps_s;
+  const double shift_s = stamps_s.front() - counted_s.front();
+  for (double& time_s : counted_s) time_s += shift_s;
+  return counted_s;
 }
 
 /// Between the readings; empty outside them.
@@ -77,17 +127,16 @@ double correlation_of(const Pairs& pairs) {
 }
 
 double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor) {
-  const double first = sensor.front().time_s - estimate.back().time_s,
-               last = sensor.back().time_s - estimate.front().time_s;
   double best = 0, best_correlation = -2;
-  for (double delay_s = first; delay_s <= last; delay_s += kDelayStep_s) {
-    const Pairs pairs = pairs_at(estimate, sensor, delay_s);
-    if (static_cast<double>(pairs.estimate_N.size()) < kLeastOverlap * static_cast<double>(estimate.size())) continue;
-    const double correlation = correlation_of(pairs);
-    if (correlation <= best_correlation) continue;
-    best_correlation = correlation;
-    best = delay_s;
-  }
+  for (const double around_s : likely_delays_s(estimate, sensor, kLeastOverlap, kCoarseStep_s))
+    for (double offset_s = -kCoarseStep_s; offset_s <= kCoarseStep_s; offset_s += kFineStep_s) {
+      const Pairs pairs = pairs_at(estimate, sensor, around_s + offset_s);
+      if (static_cast<double>(pairs.estimate_N.size()) < kLeastOverlap * static_cast<double>(estimate.size())) continue;
+      const double correlation = correlation_of(pairs);
+      if (correlation <= best_correlation) continue;
+      best_correlation = correlation;
+      best = around_s + offset_s;
+    }
   if (best_correlation <= -2)
     throw BadInput("the sensor's log and the estimate overlap by less than half of the video at any delay");
   return best;
@@ -95,25 +144,33 @@ double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<Sen
 
 }  // namespace
 
-std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file) {
-  const CsvTable table(file);
-  const std::string time = column_of(table, file, {"time_s", "Time"});
-  const std::array<std::string, 3> force = {column_of(table, file, {"fx_N", "Fx"}),
-                                            column_of(table, file, {"fy_N", "Fy"}),
-                                            column_of(table, file, {"fz_N", "Fz"})};
+std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, double video_span_s) {
+  const Table table(file, sensor_columns());
+  table.require({"fx_N", "fy_N", "fz_N"});
+  const std::vector<double> times = clock_of(table, video_span_s);
   std::vector<SensorReading> readings;
-  for (const CsvTable::Row& row : table.rows()) {
-    SensorReading reading{table.number(row, time),
-                          {table.number(row, force[0]), table.number(row, force[1]), table.number(row, force[2])}};
+  int of_same_time = 1;
+  for (size_t i = 0; i < times.size(); ++i) {
+    const Table::Row& row = table.rows()[i];
+    const SensorReading reading{times[i],
+                                {table.number(row, "fx_N"), table.number(row, "fy_N"), table.number(row, "fz_N")}};
     if (!std::isfinite(reading.time_s) || !reading.force_N.allFinite()) continue;
-    if (!readings.empty() && reading.time_s <= readings.back().time_s)
-      throw BadInput(fmt::format("{}:{}: time {} after {}, expected time that grows", file.string(), row.line,
-                                 reading.time_s, readings.back().time_s));
+    if (!readings.empty() && reading.time_s < readings.back().time_s)
+      throw BadInput(fmt::format("{}:{}: time {:.15g} s after {:.15g} s, expected time that grows", file.string(),
+                                 row.line, reading.time_s, readings.back().time_s));
+    if (!readings.empty() && reading.time_s == readings.back().time_s) {
+      ++of_same_time;
+      readings.back().force_N += (reading.force_N - readings.back().force_N) / of_same_time;
+      continue;
+    }
+    of_same_time = 1;
     readings.push_back(reading);
   }
   if (readings.size() < kFewestReadings)
-    throw BadInput(fmt::format("{}: {} rows with a time and three forces, expected at least {}", file.string(),
-                               readings.size(), kFewestReadings));
+    throw BadInput(fmt::format("{}: {} rows with a time of their own and three forces, expected at least {}; {}",
+                               file.string(), readings.size(), kFewestReadings, table.header_found()));
+  const double factor = newtons_per_value(table, readings);
+  for (SensorReading& reading : readings) reading.force_N *= factor;
   return readings;
 }
 
@@ -128,6 +185,11 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   result.camera_from_sensor = rotation_onto(pairs.sensor_N, pairs.estimate_N);
   result.frames = static_cast<int>(pairs.estimate_N.size());
   result.correlation = correlation_of(pairs);
+  if (result.correlation < kLeastCorrelation)
+    throw BadInput(
+        fmt::format("the sensor's log does not follow the estimate at any delay: the best is {:+.3f} s with a "
+                    "correlation of {:.2f}, expected at least {:g}; is it the log of this recording?",
+                    result.delay_s, result.correlation, kLeastCorrelation));
   double along = 0, squared = 0;
   for (size_t i = 0; i < pairs.estimate_N.size(); ++i) {
     along += pairs.estimate_N[i].dot(result.camera_from_sensor * pairs.sensor_N[i]);

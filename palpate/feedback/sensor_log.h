@@ -16,9 +16,11 @@ struct SensorReading {
   Vec3 force_N = Vec3::Zero();
 };
 
-/// Columns time_s, fx_N, fy_N, fz_N, or Time, Fx, Fy, Fz as ATI's programs write them; others are ignored. Throws
-/// BadInput where a column is missing, fewer than ten rows have numbers, or the time does not grow.
-std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file);
+/// A table with a time and fx, fy, fz as sensors' programs write it (`Table`): ours, ATI's with counts and rate before
+/// the table, rostopic's and a robot's (`field.wrench.force.x`). `video_span_s` helps to tell the unit of its time; 0 =
+/// not known. Rows of the same time are averaged. Throws BadInput where a column is missing, fewer than ten rows have
+/// numbers, the unit of the time cannot be told, or the time runs backwards.
+std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, double video_span_s = 0);
 
 /// How an estimate compares with a sensor whose clock and axes are not known: clock by the delay at which the
 /// magnitudes agree best, axes by the rotation that turns its forces onto the estimated ones (Kabsch 1976), zero by its
@@ -37,7 +39,8 @@ struct SensorComparison {
   double correlation = 0;  ///< of the magnitudes
 };
 
-/// Throws BadInput where they overlap by less than half of the video, or where no force is to be seen in one of them.
+/// Throws BadInput where they overlap by less than half of the video, where no force is to be seen in one of them, or
+/// where the magnitudes correlate by less than 0.5 at any delay.
 SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor);
 
 /// The log in the video's time and the left camera frame, less its zero.

@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// tip.csv: frame,time_s,x_mm,y_mm,z_mm[,closed], left camera frame. Throws BadInput with file and line.
+/// tip.csv: columns frame, time_s, x_mm, y_mm, z_mm and perhaps closed, as any program writes a table (`Table`; lengths
+/// in the unit that the header states), left camera frame. Throws BadInput with file and line.
 struct TipTrack {
   struct Row {
     double time_s = 0;

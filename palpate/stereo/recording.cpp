@@ -4,181 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
-#include <regex>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/frame_source.h"
+#include "palpate/stereo/interlacing.h"
 #include "palpate/stereo/quiet_opencv.h"
+#include "palpate/stereo/stamp_pairing.h"
 
 namespace palpate {
 namespace {
 
 constexpr double kFallbackFps = 25;
-
-/// Images of one eye (or of both in one picture), one after the other.
-class Source {
- public:
-  virtual ~Source() = default;
-  virtual bool read(cv::Mat& image) = 0;
-  virtual cv::Size size() const = 0;
-  virtual double fps() const = 0;       // 0 = unknown
-  virtual int frame_count() const = 0;  // -1 = unknown
-};
-
-/// Numbered images, or a single one.
-class ImageFiles : public Source {
- public:
-  ImageFiles(std::vector<std::filesystem::path> files, const std::string& key) : files_(std::move(files)), key_(key) {
-    size_ = load(files_.front()).size();
-  }
-  bool read(cv::Mat& image) override {
-    if (next_ >= files_.size()) return false;
-    image = load(files_[next_]);
-    if (image.size() != size_)
-      throw BadInput(fmt::format("recording.{}: {} is {}x{} px, expected {}x{} px like the first image", key_,
-                                 files_[next_].string(), image.cols, image.rows, size_.width, size_.height));
-    ++next_;
-    return true;
-  }
-  cv::Size size() const override { return size_; }
-  double fps() const override { return 0; }
-  int frame_count() const override { return static_cast<int>(files_.size()); }
-
- private:
-  cv::Mat load(const std::filesystem::path& file) const {
-    cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
-    if (image.empty()) throw BadInput(fmt::format("recording.{}: {} is not an image that opens", key_, file.string()));
-    return image;
-  }
-
-  std::vector<std::filesystem::path> files_;
-  std::string key_;
-  cv::Size size_;
-  size_t next_ = 0;
-};
-
-/// Whatever cv::VideoCapture opens: video file, device, GStreamer pipeline, address.
-class Video : public Source {
- public:
-  Video(const cv::VideoCapture& capture, bool is_file, const std::string& name, const std::string& key)
-      : capture_(capture) {
-    size_ = {static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
-             static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT))};
-    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
-    frame_count_ = is_file && count > 0 && count < 1e9 ? static_cast<int>(count) : -1;
-    // Some headers lie about the first frame only; a video whose first frame does not decode is of no use at all.
-    if (!capture_.read(first_) || first_.empty())
-      throw BadInput(fmt::format("recording.{}: {} holds no frame that can be decoded", key, name));
-    size_ = first_.size();
-  }
-  bool read(cv::Mat& image) override {
-    if (!first_.empty()) {
-      image = first_;
-      first_.release();
-      return true;
-    }
-    cv::Mat decoded;  // a fresh one each time: frames are handed on without copying
-    if (!capture_.read(decoded) || decoded.empty()) return false;
-    image = decoded;
-    return true;
-  }
-  cv::Size size() const override { return size_; }
-  double fps() const override {
-    const double rate = capture_.get(cv::CAP_PROP_FPS);
-    return std::isfinite(rate) && rate > 0 && rate < 1000 ? rate : 0;
-  }
-  int frame_count() const override { return frame_count_; }
-
- private:
-  cv::VideoCapture capture_;
-  cv::Mat first_;
-  cv::Size size_;
-  int frame_count_ = -1;
-};
-
-bool is_image_name(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp", ".jp2"})
-    if (ending == known) return true;
-  return false;
-}
-
-/// Files that a pattern such as left_%04d.png names, by rising number; their numbers in `numbers`.
-std::vector<std::filesystem::path> files_of_pattern(const std::filesystem::path& pattern, std::vector<long>& numbers) {
-  static const std::regex kPlaceholder("%(0?)([0-9]*)d");
-  const std::string name = pattern.filename().string();
-  std::smatch found;
-  if (!std::regex_search(name, found, kPlaceholder)) return {};
-  const std::string before = found.prefix(), after = found.suffix();
-  const size_t width = found[2].length() ? std::stoul(found[2]) : 1;
-  std::vector<std::pair<long, std::filesystem::path>> matches;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(pattern.parent_path(), ignored)) {
-    const std::string file = entry.path().filename().string();
-    if (file.size() <= before.size() + after.size() || !file.starts_with(before) || !file.ends_with(after)) continue;
-    const std::string digits = file.substr(before.size(), file.size() - before.size() - after.size());
-    if (digits.size() < width || digits.size() > 9 || digits.find_first_not_of("0123456789") != std::string::npos)
-      continue;
-    matches.emplace_back(std::stol(digits), entry.path());
-  }
-  std::sort(matches.begin(), matches.end());
-  std::vector<std::filesystem::path> files;
-  for (const auto& [number, file] : matches) {
-    numbers.push_back(number);
-    files.push_back(file);
-  }
-  return files;
-}
-
-std::unique_ptr<Source> open_pattern(const std::filesystem::path& path, const std::string& key,
-                                     std::vector<long>& numbers) {
-  std::vector<std::filesystem::path> files = files_of_pattern(path, numbers);
-  if (files.empty()) throw BadInput(fmt::format("recording.{}: no image is named like {}", key, path.string()));
-  for (size_t i = 1; i < numbers.size(); ++i)
-    if (numbers[i] != numbers[i - 1] + 1)
-      throw BadInput(fmt::format("recording.{}: image {} of {} is missing", key, numbers[i - 1] + 1, path.string()));
-  return std::make_unique<ImageFiles>(std::move(files), key);
-}
-
-std::unique_ptr<Source> open_source(const std::filesystem::path& path, const std::string& key,
-                                    std::vector<long>& numbers) {
-  const std::string name = path.string();
-  const bool is_device = name.find_first_not_of("0123456789") == std::string::npos;
-  const bool is_pipeline = name.find(" ! ") != std::string::npos;
-  const bool is_address = name.find("://") != std::string::npos;
-  cv::VideoCapture capture;
-  if (is_device) {
-    capture.open(std::stoi(name));
-  } else if (is_pipeline) {
-    capture.open(name, cv::CAP_GSTREAMER);
-  } else if (is_address) {
-    capture.open(name);
-  } else if (name.find('%') != std::string::npos) {
-    return open_pattern(path, key, numbers);
-  } else {
-    if (const std::string obstacle = obstacle_to_reading(path); !obstacle.empty())
-      throw BadInput(fmt::format("recording.{}: {} {}, expected a video", key, name, obstacle));
-    if (is_image_name(path)) return std::make_unique<ImageFiles>(std::vector{path}, key);
-    capture.open(name, cv::CAP_FFMPEG);
-  }
-  if (!capture.isOpened())
-    throw BadInput(fmt::format("recording.{}: {} cannot be opened as a {}", key, name,
-                               is_device     ? "camera device"
-                               : is_pipeline ? "GStreamer pipeline"
-                                             : "video"));
-  return std::make_unique<Video>(capture, !is_device && !is_pipeline && !is_address, name, key);
-}
-
-/// Matroska, MPEG streams and the like hold no frame count: OpenCV works it out from the duration.
-int slack_of(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  for (const char* counted : {".mp4", ".m4v", ".mov", ".avi"})
-    if (ending == counted) return 0;
-  return file.string().find('%') != std::string::npos || is_image_name(file) ? 0 : 2;
-}
 
 void check_options(const RecordingOptions& options) {
   const bool two = !options.left.empty() && !options.right.empty();
@@ -194,51 +30,9 @@ void check_options(const RecordingOptions& options) {
     throw BadInput(fmt::format(
         "recording.left and recording.right are the same, {}, expected one for each eye (or stereo with its layout)",
         options.left.string()));
+  if (!options.crop_px.empty() || options.crop_px == cv::Rect2d()) return;
+  throw BadInput("recording.crop has no area, expected [x, y, width, height] in pixels of the calibrated images");
 }
-
-}  // namespace
-
-void describe(Settings& settings, RecordingOptions& options) {
-  settings.path("left", options.left, "video of the left eye: file, image pattern, device number, GStreamer pipeline");
-  settings.path("right", options.right, "video of the right eye");
-  settings.path("stereo", options.stereo, "one video that holds both eyes, instead of left and right");
-  settings.choice<StereoLayout>(
-      "layout", options.layout,
-      {{"side-by-side", StereoLayout::side_by_side}, {"top-bottom", StereoLayout::top_bottom}},
-      "where the eyes stand in the stereo video; the left one is left or on top");
-  settings.flag("swap", options.swap, "exchange left and right");
-  settings.path("calibration", options.calibration,
-                "OpenCV stereo calibration (M1 D1 M2 D2 R T or K1 ...), or the left file of a ROS camera_info pair");
-  settings.require("calibration");
-  settings.choice<TranslationUnit>(
-      "translation_unit", options.translation_unit,
-      {{"detect", TranslationUnit::detect}, {"mm", TranslationUnit::mm}, {"m", TranslationUnit::m}},
-      "unit of T in the calibration");
-  settings.number("fps", options.fps, {0, 1000, false, false}, "frames per second; 0 = as the video says");
-  settings.after_reading([&options] { check_options(options); });
-}
-
-struct Recording::Sources {
-  RecordingOptions options;
-  std::unique_ptr<Source> first;   // left, or both eyes in one image
-  std::unique_ptr<Source> second;  // right, or none
-  cv::Size eye_size;
-  double fps = 0;
-  int frame_count = -1;
-  int slack = 0;
-  int index = 0;
-
-  StereoFrame split(const cv::Mat& both) const {
-    StereoFrame frame;
-    const cv::Point second_eye =
-        options.layout == StereoLayout::side_by_side ? cv::Point(eye_size.width, 0) : cv::Point(0, eye_size.height);
-    frame.left = both(cv::Rect({0, 0}, eye_size)).clone();
-    frame.right = both(cv::Rect(second_eye, eye_size)).clone();
-    return frame;
-  }
-};
-
-namespace {
 
 cv::Size eye_size_of(const RecordingOptions& options, cv::Size both) {
   const bool beside = options.layout == StereoLayout::side_by_side;
@@ -250,15 +44,124 @@ cv::Size eye_size_of(const RecordingOptions& options, cv::Size both) {
   return beside ? cv::Size(both.width / 2, both.height) : cv::Size(both.width, both.height / 2);
 }
 
-void check_alike(const RecordingOptions& options, const Source& left, const Source& right, int slack) {
+}  // namespace
+
+void describe(Settings& settings, RecordingOptions& options) {
+  settings.path("left", options.left,
+                "video of the left eye: file, image pattern (left_%04d.png), device number, GStreamer pipeline");
+  settings.path("right", options.right, "video of the right eye");
+  settings.path("stereo", options.stereo, "one video that holds both eyes, instead of left and right");
+  settings.choice<StereoLayout>(
+      "layout", options.layout,
+      {{"side-by-side", StereoLayout::side_by_side}, {"top-bottom", StereoLayout::top_bottom}},
+      "where the eyes stand in the stereo video; the left one is left or on top");
+  settings.flag("swap", options.swap, "exchange left and right");
+  settings.flag("deinterlace", options.deinterlace,
+                "replace every second row by what its neighbours show, where they are of another moment");
+  settings.path("calibration", options.calibration,
+                "stereo calibration: OpenCV's (M1 D1 M2 D2 R T), Kalibr's, MATLAB's ..., or the left file of a ROS "
+                "camera_info pair; docs/inputs.md names them all");
+  settings.require("calibration");
+  settings.choice<TranslationUnit>(
+      "translation_unit", options.translation_unit,
+      {{"detect", TranslationUnit::detect}, {"mm", TranslationUnit::mm}, {"m", TranslationUnit::m}},
+      "unit of T in the calibration");
+  settings.rectangle("crop", options.crop_px,
+                     "part of the calibrated images that the recording shows, px of those images; of no size = all");
+  settings.number("scale", options.scale, {0, 100, true, false},
+                  "size of the recorded images over that of the part that they show");
+  settings.number("fps", options.fps, {0, 1000, false, false}, "frames per second; 0 = as the video's time stamps say");
+  settings.after_reading([&options] { check_options(options); });
+}
+
+StereoRig read_rig(const RecordingOptions& options) {
+  const StereoRig rig = read_rig(options.calibration, options.translation_unit);
+  if (options.crop_px.empty() && options.scale == 1) return rig;
+  return cut_and_scaled(rig, options.crop_px, options.scale);
+}
+
+struct Recording::Sources {
+  RecordingOptions options;
+  std::unique_ptr<FrameSource> first;   // left, or both eyes in one image
+  std::unique_ptr<FrameSource> second;  // right, or none
+  cv::Size eye_size;
+  double fps = 0;
+  int frame_count = -1;
+  int index = 0;
+  StampPairing pairing;
+  std::optional<FrameSource::Frame> right;  // the next one that is not yet used
+  double first_stamp_s = 0;
+  std::vector<std::string> notes;
+
+  StereoFrame split(const cv::Mat& both) const {
+    StereoFrame frame;
+    const cv::Point second_eye =
+        options.layout == StereoLayout::side_by_side ? cv::Point(eye_size.width, 0) : cv::Point(0, eye_size.height);
+    frame.left = both(cv::Rect({0, 0}, eye_size)).clone();
+    frame.right = both(cv::Rect(second_eye, eye_size)).clone();
+    return frame;
+  }
+
+  bool is_live() const { return first->stamps_s().empty() || (second && second->stamps_s().empty()); }
+
+  /// The right image of the moment of a left one; empty where there is none.
+  cv::Mat right_image_at(double left_stamp_s) {
+    const std::vector<double>&lefts = first->stamps_s(), &rights = second->stamps_s();
+    const auto after = std::lower_bound(lefts.begin(), lefts.end(), left_stamp_s - kSameStamp_s);
+    if (after == lefts.end()) return {};
+    const int partner = pairing.right_of_left[static_cast<size_t>(after - lefts.begin())];
+    if (partner < 0) return {};
+    const double wanted_s = rights[static_cast<size_t>(partner)];
+    while (right && right->time_s < wanted_s - kSameStamp_s) right = second->next();
+    if (!right || right->time_s > wanted_s + kSameStamp_s) return {};
+    const cv::Mat image = right->image;
+    right = second->next();
+    return image;
+  }
+
+  /// Stamps of packets and of what is decoded from them differ by rounding only.
+  static constexpr double kSameStamp_s = 1e-6;
+};
+
+namespace {
+
+void check_alike(const RecordingOptions& options, const FrameSource& left, const FrameSource& right) {
   if (left.size() != right.size())
     throw BadInput(fmt::format("recording: {} is {}x{} px but {} is {}x{} px, expected the same size",
                                options.left.string(), left.size().width, left.size().height, options.right.string(),
                                right.size().width, right.size().height));
-  const int n = left.frame_count(), m = right.frame_count();
-  if (n >= 0 && m >= 0 && std::abs(n - m) > slack)
-    throw BadInput(fmt::format("recording: {} has {} frames but {} has {}, expected the same number",
-                               options.left.string(), n, options.right.string(), m));
+  const bool numbered = left.clock() == "numbers" && right.clock() == "numbers";
+  const std::vector<double>&a = left.stamps_s(), &b = right.stamps_s();
+  if (numbered && a.size() > 1 && a.size() == b.size() && a.front() != b.front())
+    throw BadInput(fmt::format(
+        "recording: the images of {} and of {} are as many, but begin with different numbers ({:.0f} and {:.0f}); "
+        "expected images of the same moment to have the same number",
+        options.left.string(), options.right.string(), a.front() * left.stated_fps(), b.front() * right.stated_fps()));
+}
+
+/// Where steps vary, a stated rate is that of no frame.
+double mean_fps(const FrameSource& source, const RecordingTiming& timing) {
+  const std::vector<double>& stamps = source.stamps_s();
+  const double stated = source.stated_fps();
+  if (stamps.size() < 2) return stated;
+  const double mean = static_cast<double>(stamps.size() - 1) / (stamps.back() - stamps.front());
+  const bool is_usual = stated > 0 && std::abs(stated / timing.rate_Hz - 1) < 0.02;
+  return is_usual && std::abs(mean / stated - 1) < 0.25 ? stated : mean;
+}
+
+std::vector<std::string> notes_of(const RecordingTiming& timing, double frames, double shift_s) {
+  std::vector<std::string> notes;
+  if (timing.gaps > 0)
+    notes.push_back(
+        fmt::format("the frame rate varies: {} of {:.0f} steps are longer than the usual {:.1f} ms, up to {:.1f} ms",
+                    timing.gaps, frames - 1, 1000 / timing.rate_Hz, 1000 * timing.longest_gap_s));
+  if (std::abs(shift_s) > 0)
+    notes.push_back(fmt::format(
+        "the clocks of left and right differ by {:+.3f} s: both are counted from their first frame", shift_s));
+  if (timing.left_without_right + timing.right_without_left > 0)
+    notes.push_back(fmt::format("{} left frames have no right one of their time, {} right frames no left one",
+                                timing.left_without_right, timing.right_without_left));
+  return notes;
 }
 
 }  // namespace
@@ -268,24 +171,34 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   const QuietOpenCv quiet;
   Sources& s = *sources_;
   s.options = options;
-  std::vector<long> numbers, right_numbers;
   if (options.stereo.empty()) {
-    s.first = open_source(options.left, "left", numbers);
-    s.second = open_source(options.right, "right", right_numbers);
-    s.slack = std::max(slack_of(options.left), slack_of(options.right));
-    check_alike(options, *s.first, *s.second, s.slack);
-    if (!numbers.empty() && !right_numbers.empty() && numbers.front() != right_numbers.front())
-      throw BadInput(fmt::format("recording: the images of {} begin with number {} but those of {} with {}",
-                                 options.left.string(), numbers.front(), options.right.string(),
-                                 right_numbers.front()));
+    s.first = open_frame_source(options.left, "recording.left", options.fps);
+    s.second = open_frame_source(options.right, "recording.right", options.fps);
+    check_alike(options, *s.first, *s.second);
     s.eye_size = s.first->size();
   } else {
-    s.first = open_source(options.stereo, "stereo", numbers);
-    s.slack = slack_of(options.stereo);
+    s.first = open_frame_source(options.stereo, "recording.stereo", options.fps);
     s.eye_size = eye_size_of(options, s.first->size());
   }
-  s.frame_count = s.second ? std::min(s.first->frame_count(), s.second->frame_count()) : s.first->frame_count();
-  s.fps = options.fps > 0 ? options.fps : s.first->fps() > 0 ? s.first->fps() : kFallbackFps;
+  const std::vector<double>& stamps = s.first->stamps_s();
+  if (!stamps.empty()) s.first_stamp_s = stamps.front();
+  s.pairing.timing = timing_of(stamps);
+  if (s.second && !s.is_live()) {
+    s.pairing = pair_by_stamp(stamps, s.second->stamps_s(), s.first->clock() == s.second->clock());
+    if (s.pairing.timing.left_without_right == static_cast<int>(stamps.size()))
+      throw BadInput(
+          fmt::format("recording: no frame of {} is of the time of one of {}, expected both to show the same "
+                      "moments",
+                      options.left.string(), options.right.string()));
+    s.right = s.second->next();
+  }
+  const int held = static_cast<int>(stamps.size()), whole = s.first->frames_if_whole();
+  s.frame_count = stamps.empty() ? -1 : std::max(held, whole);
+  s.fps = options.fps > 0 ? options.fps : mean_fps(*s.first, s.pairing.timing);
+  if (!(s.fps > 0)) s.fps = kFallbackFps;
+  s.notes = notes_of(s.pairing.timing, held, s.pairing.right_shift_s);
+  if (s.first->is_interlaced() && !options.deinterlace)
+    s.notes.push_back("the pictures are interlaced, every second row is of another moment: set recording.deinterlace");
 }
 
 Recording::~Recording() = default;
@@ -294,21 +207,34 @@ Recording::Recording(Recording&&) noexcept = default;
 std::optional<StereoFrame> Recording::next() {
   Sources& s = *sources_;
   const QuietOpenCv quiet;
-  cv::Mat first, second;
-  const bool has_first = s.first->read(first);
-  const bool has_second = !s.second || s.second->read(second);
-  if (!has_first || !has_second) {
-    if (s.frame_count >= 0 && s.index < s.frame_count - s.slack) {
-      const std::filesystem::path& file = !s.second ? s.options.stereo : has_first ? s.options.right : s.options.left;
-      throw Unfinished(fmt::format("recording: {} ends after {} frames, its header states {}", file.string(), s.index,
-                                   s.frame_count));
-    }
+  std::optional<FrameSource::Frame> first = s.first->next();
+  std::optional<FrameSource::Frame> second;
+  if (s.second && s.is_live()) second = s.second->next();
+  const bool ended = !first || (s.second && s.is_live() && !second);
+  const bool right_is_cut = s.second && !s.is_live() && !s.right && s.second->frames_if_whole() > 0;
+  if (ended || right_is_cut) {
+    const FrameSource& source = ended ? *s.first : *s.second;
+    if (const int whole = source.frames_if_whole(); whole > 0)
+      throw Unfinished(fmt::format("recording: {} ends after {} frames, its header states {}",
+                                   (!s.second ? s.options.stereo
+                                    : ended   ? s.options.left
+                                              : s.options.right)
+                                       .string(),
+                                   s.index, whole));
     return std::nullopt;
   }
-  StereoFrame frame = s.second ? StereoFrame{0, 0, first, second} : s.split(first);
+  StereoFrame frame;
+  if (!s.second)
+    frame = s.split(first->image);
+  else
+    frame = {0, 0, first->image, s.is_live() ? second->image : s.right_image_at(first->time_s)};
+  if (s.options.deinterlace)
+    for (cv::Mat* image : {&frame.left, &frame.right})
+      if (!image->empty()) *image = deinterlaced(*image);
   if (s.options.swap) std::swap(frame.left, frame.right);
   frame.index = s.index++;
-  frame.time_s = frame.index / s.fps;
+  const bool by_stamp = !s.first->stamps_s().empty() && s.options.fps <= 0;
+  frame.time_s = by_stamp ? first->time_s - s.first_stamp_s : frame.index / s.fps;
   return frame;
 }
 
@@ -320,6 +246,12 @@ double Recording::fps() const {
 }
 int Recording::frame_count() const {
   return sources_->frame_count;
+}
+const RecordingTiming& Recording::timing() const {
+  return sources_->pairing.timing;
+}
+const std::vector<std::string>& Recording::notes() const {
+  return sources_->notes;
 }
 
 }  // namespace palpate

@@ -12,7 +12,7 @@ namespace {
 bool has_no_distortion(const Camera& camera) {
   for (const double coefficient : camera.distortion)
     if (coefficient != 0) return false;
-  return true;
+  return camera.lens == LensModel::brown;
 }
 
 // Nothing to do when the pixels would move by less than a hundred-thousandth.
@@ -36,6 +36,14 @@ cv::Mat valid_pixels(const cv::Mat& map_x, const cv::Mat& map_y, cv::Size size) 
   return valid;
 }
 
+void make_maps(const Camera& camera, const cv::Mat& turn, const cv::Mat& projection, cv::Size size, cv::Mat& map_x,
+               cv::Mat& map_y) {
+  if (camera.lens == LensModel::fisheye)
+    cv::fisheye::initUndistortRectifyMap(camera.K, camera.distortion, turn, projection, size, CV_32F, map_x, map_y);
+  else
+    cv::initUndistortRectifyMap(camera.K, camera.distortion, turn, projection, size, CV_32F, map_x, map_y);
+}
+
 }  // namespace
 
 Rectification make_rectification(const StereoRig& rig, cv::Size video_size) {
@@ -56,13 +64,15 @@ Rectification make_rectification(const StereoRig& rig, cv::Size video_size) {
   cv::Mat R, R1, R2, P1, P2, Q;
   cv::eigen2cv(rig.right_from_left, R);
   const cv::Vec3d T(rig.right_from_left_mm.x(), rig.right_from_left_mm.y(), rig.right_from_left_mm.z());
-  // alpha = -1 keeps the resolution of the recording; what the shifted images lack is left to the validity masks.
-  cv::stereoRectify(rig.left.K, rig.left.distortion, rig.right.K, rig.right.distortion, video_size, R, T, R1, R2, P1,
-                    P2, Q, cv::CALIB_ZERO_DISPARITY, -1, video_size);
-  cv::initUndistortRectifyMap(rig.left.K, rig.left.distortion, R1, P1, video_size, CV_32F, result.left_map_x,
-                              result.left_map_y);
-  cv::initUndistortRectifyMap(rig.right.K, rig.right.distortion, R2, P2, video_size, CV_32F, result.right_map_x,
-                              result.right_map_y);
+  // alpha = -1 keeps the resolution of the recording; what the shifted images lack is left to the validity masks. The
+  // distortion only moves the middle; that of a fisheye lens is not what this function expects.
+  const auto brown = [](const Camera& camera) {
+    return camera.lens == LensModel::brown ? camera.distortion : std::vector<double>{};
+  };
+  cv::stereoRectify(rig.left.K, brown(rig.left), rig.right.K, brown(rig.right), video_size, R, T, R1, R2, P1, P2, Q,
+                    cv::CALIB_ZERO_DISPARITY, -1, video_size);
+  make_maps(rig.left, R1, P1, video_size, result.left_map_x, result.left_map_y);
+  make_maps(rig.right, R2, P2, video_size, result.right_map_x, result.right_map_y);
   result.focal_px = P1.at<double>(0, 0);
   result.principal_x_px = P1.at<double>(0, 2);
   result.principal_y_px = P1.at<double>(1, 2);
@@ -83,7 +93,8 @@ RectifiedPair rectify(const Rectification& rectification, const StereoFrame& fra
     return pair;
   }
   cv::remap(frame.left, pair.left, rectification.left_map_x, rectification.left_map_y, cv::INTER_CUBIC);
-  cv::remap(frame.right, pair.right, rectification.right_map_x, rectification.right_map_y, cv::INTER_CUBIC);
+  if (!frame.right.empty())
+    cv::remap(frame.right, pair.right, rectification.right_map_x, rectification.right_map_y, cv::INTER_CUBIC);
   return pair;
 }
 

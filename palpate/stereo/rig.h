@@ -3,15 +3,22 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "palpate/core/geometry.h"
 
 namespace palpate {
 
-/// One eye: pinhole with OpenCV distortion (k1 k2 p1 p2 k3 ...). Pixel centres at integer coordinates.
+enum class LensModel {
+  brown,   ///< OpenCV's: k1 k2 p1 p2 k3, k4 k5 k6, s1 s2 s3 s4, tau_x tau_y
+  fisheye  ///< Kannala and Brandt 2006: k1 k2 k3 k4 of the angle
+};
+
+/// One camera: pinhole and the distortion of its lens. Pixel centres at integer coordinates.
 struct Camera {
   cv::Matx33d K = cv::Matx33d::eye();
   std::vector<double> distortion;
+  LensModel lens = LensModel::brown;
 };
 
 /// A calibrated pair of eyes: x_right = right_from_left * x_left + right_from_left_mm.
@@ -21,17 +28,24 @@ struct StereoRig {
   Camera right;
   Mat3 right_from_left = Mat3::Identity();
   Vec3 right_from_left_mm = Vec3::Zero();
-  std::filesystem::path file;  ///< where it was read from, for error sentences
+  std::filesystem::path file;      ///< where it was read from, for error sentences
+  std::vector<std::string> notes;  ///< what it was recognised as, and what was converted
 
   double baseline_mm() const { return right_from_left_mm.norm(); }
 };
 
 enum class TranslationUnit { detect, mm, m };
 
-/// Reads OpenCV FileStorage (M1 D1 M2 D2 R T or K1 D1 K2 D2 R T, optional image size) or a ROS camera_info pair
-/// (left.yaml:right.yaml of which this is the left; the right one stands beside it with "left" replaced by "right").
-/// Throws BadInput: file missing, key missing, R not a rotation, baseline outside 1-200 mm.
+/// Reads a stereo calibration by its structure, whichever tool wrote it (docs/inputs.md names them): YAML, XML, JSON,
+/// INI or text, with M1 D1 M2 D2 R T in any of their spellings, camera_info of ROS (the left file; the right one stands
+/// beside it with "left" replaced by "right"), Kalibr's camchain, MATLAB's stereoParams. Intrinsics and extrinsics may
+/// be two files side by side. Throws BadInput that names the keys that are there: file or value missing, R not a
+/// rotation, baseline outside 1-200 mm, a lens model that is not known or that can be either of two.
 StereoRig read_rig(const std::filesystem::path& calibration, TranslationUnit unit = TranslationUnit::detect);
+
+/// The rig of pictures that were cut out of the calibrated ones (an empty rectangle: not cut) and then scaled. Throws
+/// BadInput where the calibrated images do not hold the rectangle.
+StereoRig cut_and_scaled(const StereoRig& rig, const cv::Rect2d& crop_px, double scale);
 
 /// Throws BadInput when the calibration cannot belong to a video of this size (size named and different, or principal
 /// point far from the centre where none is named).
@@ -42,6 +56,12 @@ cv::Point2d field_of_view_deg(const Camera& camera, cv::Size video_size);
 
 /// "baseline 4.14 mm, focal 1035 px, field of view 63 x 53 degrees"
 std::string describe_rig(const StereoRig& rig, cv::Size video_size);
+
+/// Where the lens bends a place of the plane z = 1 to, in the same plane.
+cv::Point2d distorted(const Camera& camera, cv::Point2d place);
+
+/// Places in the plane z = 1 of recorded pixels: the inverse of lens and camera matrix.
+std::vector<cv::Point2d> undistorted(const Camera& camera, const std::vector<cv::Point2d>& recorded_px);
 
 /// Pixel of the *recorded* left image where a point of the left camera frame is seen (C_l of the paper, with
 /// distortion). The point must have z > 0.

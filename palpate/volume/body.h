@@ -16,9 +16,10 @@ enum class LengthUnit { mm, m };
 /// surface or nothing of it faces the camera.
 Surface close_body(const Surface& visible, double thickness_mm);
 
-/// A closed surface or a volume from a scan, in the left camera frame: .msh (Gmsh 1, 2.2, 4.1 ASCII) .vtk (legacy
-/// ASCII) .vtu (uncompressed) .obj .ply .stl; of a volume its boundary is taken. Oriented outwards (cavities, if the
-/// file orients them, stay cavities). Throws BadInput: unreadable, empty, open surface.
+/// A closed surface or a volume from a scan, in the left camera frame: .msh (Gmsh) .vtk .vtu .vtp .obj .ply .stl as
+/// docs/inputs.md says; of a volume its boundary is taken. Corners nearer than a millionth of the body's extent are
+/// one. Oriented outwards (cavities, if the file orients them, stay cavities). Throws BadInput: unreadable, empty, open
+/// surface (with the number of its holes).
 Surface read_body(const std::filesystem::path& file, LengthUnit unit);
 
 }  // namespace palpate

@@ -1,8 +1,7 @@
 #include "palpate/volume/polygon_soup.h"
 
-#include <CGAL/IO/polygon_soup_io.h>
-#include <CGAL/Simple_cartesian.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -27,47 +26,97 @@ const std::map<int, std::vector<std::vector<int>>>& faces_of_cells() {
   return kFaces;
 }
 
-/// Quadratic cells begin with the corners of their linear ones.
+/// Cells of higher order begin with the corners of their linear ones (VTK's quadratic and Lagrange types).
 int linear_type(int type) {
   switch (type) {
     case 22:
+    case 34:
+    case 69:
       return 5;
     case 23:
     case 28:
+    case 30:
+    case 70:
       return 9;
     case 24:
+    case 71:
       return 10;
     case 25:
     case 29:
+    case 33:
+    case 72:
       return 12;
     case 26:
+    case 31:
+    case 32:
+    case 73:
       return 13;
     case 27:
+    case 37:
+    case 74:
       return 14;
     default:
       return type;
   }
 }
 
+int corners_of(const std::vector<std::vector<int>>& faces) {
+  int most = 0;
+  for (const std::vector<int>& face : faces) most = std::max(most, *std::max_element(face.begin(), face.end()));
+  return most + 1;
+}
+
 void add_polygon(const std::vector<int>& polygon, Surface& surface) {
   for (size_t k = 2; k < polygon.size(); ++k) surface.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
 }
 
-Surface read_with_cgal(const std::filesystem::path& file) {
-  std::vector<CGAL::Simple_cartesian<double>::Point_3> points;
-  std::vector<std::vector<size_t>> polygons;
-  if (!CGAL::IO::read_polygon_soup(file.string(), points, polygons)) throw BadInput("no readable polygons in it");
-  Surface surface;
-  for (const auto& p : points) surface.vertices_mm.emplace_back(p.x(), p.y(), p.z());
-  for (const auto& polygon : polygons) {
-    if (std::any_of(polygon.begin(), polygon.end(), [&](size_t corner) { return corner >= points.size(); }))
-      throw BadInput("a polygon names a corner that is not there");
-    add_polygon({polygon.begin(), polygon.end()}, surface);
-  }
-  return surface;
+struct MeshKind {
+  std::vector<std::string> extensions;
+  CellSoup (*read)(std::string_view);
+  InputKind input;
+};
+
+const std::vector<MeshKind>& registry() {
+  static const std::vector<MeshKind> kKinds = {
+      {{".msh"},
+       read_gmsh,
+       {"Gmsh 1, 2.2, 4.0, 4.1", "Gmsh, SOFA, meshio, CGAL", "text or binary of either byte order, any order"}},
+      {{".vtk"},
+       read_vtk_legacy,
+       {"legacy VTK 1 to 5.1", "3D Slicer, PyVista, ParaView, ITK-SNAP, FEBio",
+        "text or binary, UNSTRUCTURED_GRID or POLYDATA"}},
+      {{".vtu", ".vtp"},
+       read_vtk_xml,
+       {"VTK XML", "ParaView, VTK, PyVista, meshio, Palpate",
+        "text, base64 or appended; zlib, lz4, lzma; either byte order; several pieces"}},
+      {{".obj"},
+       read_obj,
+       {"Wavefront OBJ", "Blender, MeshLab, Meshroom, photogrammetry",
+        "v and f with or without texture and normals, numbers that count back, free edges"}},
+      {{".ply"},
+       read_ply,
+       {"PLY", "MeshLab, CloudCompare, Open3D, Palpate",
+        "text or binary of either byte order, further properties, triangle strips"}},
+      {{".stl"}, read_stl, {"STL", "3D Slicer, Mimics, CAD", "text or binary, told by length"}},
+  };
+  return kKinds;
 }
 
 }  // namespace
+
+std::vector<InputKind> mesh_kinds() {
+  std::vector<InputKind> kinds;
+  for (const MeshKind& kind : registry()) {
+    kinds.push_back(kind.input);
+    kinds.back().kind += fmt::format(" ({})", fmt::join(kind.extensions, ", "));
+  }
+  kinds.push_back(
+      {"cells", "",
+       "tetrahedra, hexahedra, voxels, wedges, pyramids (their boundary is taken), else triangles, quadrilaterals, "
+       "polygons, strips; of a higher order the corners; inverted tetrahedra are turned; polyhedra are refused"});
+  kinds.push_back({"corners", "", "those nearer than a millionth of the mesh's extent are one"});
+  return kinds;
+}
 
 Surface skin_of(const CellSoup& soup) {
   Surface surface;
@@ -79,15 +128,19 @@ Surface skin_of(const CellSoup& soup) {
                     [&](int node) { return node < 0 || node >= static_cast<int>(soup.points.size()); }))
       throw BadInput(fmt::format("cell {} names a node that is not there", i));
     const int type = linear_type(soup.types[i]);
-    const auto found = faces_of_cells().find(type);
+    if (type == 42) throw BadInput("polyhedra are not supported, expected tetrahedra, hexahedra, wedges or pyramids");
+    const auto found = faces_of_cells().find(type == 11 ? 12 : type);
     if (found == faces_of_cells().end()) continue;
+    if (type == 11 && cell.size() >= 8) std::swap(cell[2], cell[3]), std::swap(cell[6], cell[7]);  // a voxel
+    if (static_cast<int>(cell.size()) < corners_of(found->second))
+      throw BadInput(fmt::format("cell {} has {} nodes, too few for its type", i, cell.size()));
     if (type == 10 && cell.size() >= 4) {
       const auto point = [&](size_t k) -> const Vec3& { return soup.points[static_cast<size_t>(cell[k])]; };
       if (signed_volume_mm3(point(0), point(1), point(2), point(3)) < 0) std::swap(cell[2], cell[3]);
     }
     for (const std::vector<int>& corners : found->second) {
       std::vector<int> face;
-      for (int corner : corners) face.push_back(cell.at(static_cast<size_t>(corner)));
+      for (int corner : corners) face.push_back(cell[static_cast<size_t>(corner)]);
       std::vector<int> key = face;
       std::sort(key.begin(), key.end());
       auto& place = faces[key];
@@ -100,9 +153,12 @@ Surface skin_of(const CellSoup& soup) {
   if (!faces.empty()) return surface;
   for (size_t i = 0; i < soup.cells.size(); ++i) {
     const int type = linear_type(soup.types[i]);
-    const size_t corners = type == 5 ? 3 : type == 9 ? 4 : type == 7 ? soup.cells[i].size() : 0;
-    if (corners >= 3 && corners <= soup.cells[i].size())
-      add_polygon({soup.cells[i].begin(), soup.cells[i].begin() + static_cast<std::ptrdiff_t>(corners)}, surface);
+    const size_t corners = type == 5 ? 3 : type == 9 || type == 8 ? 4 : type == 7 ? soup.cells[i].size() : 0;
+    if (corners >= 3 && corners <= soup.cells[i].size()) {
+      std::vector<int> polygon(soup.cells[i].begin(), soup.cells[i].begin() + static_cast<std::ptrdiff_t>(corners));
+      if (type == 8) std::swap(polygon[2], polygon[3]);  // a pixel
+      add_polygon(polygon, surface);
+    }
     if (type == 6)  // a strip of triangles turns every second one over
       for (size_t k = 2; k < soup.cells[i].size(); ++k)
         surface.triangles.push_back({soup.cells[i][k - 2], soup.cells[i][k - 1 + k % 2], soup.cells[i][k - k % 2]});
@@ -114,23 +170,21 @@ Surface read_polygon_soup(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file))
-    throw BadInput(fmt::format("{}: no such file, expected a volume or a closed surface", file.string()));
-  try {
-    if (extension == ".ply" || extension == ".obj" || extension == ".stl") return read_with_cgal(file);
-    if (extension == ".msh") return skin_of(read_gmsh(stream));
-    if (extension == ".vtk") return skin_of(read_vtk_legacy(stream));
-    if (extension == ".vtu") {
-      std::ostringstream text;
-      text << stream.rdbuf();
-      return skin_of(read_vtu(text.str()));
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(fmt::format("{} {}, expected a volume or a closed surface", file.string(), obstacle));
+  std::ostringstream stream;
+  stream << std::ifstream(file, std::ios::binary).rdbuf();
+  const std::string bytes = stream.str();
+  for (const MeshKind& kind : registry()) {
+    if (std::find(kind.extensions.begin(), kind.extensions.end(), extension) == kind.extensions.end()) continue;
+    try {
+      return skin_of(kind.read(bytes));
+    } catch (const std::exception& error) {
+      throw BadInput(fmt::format("{} cannot be read: {}", file.string(), error.what()));
     }
-  } catch (const std::exception& error) {
-    throw BadInput(fmt::format("{} cannot be read: {}", file.string(), error.what()));
   }
-  throw BadInput(fmt::format("{}: unknown kind of file '{}', expected .msh .vtk .vtu .obj .ply or .stl", file.string(),
-                             extension));
+  throw BadInput(fmt::format("{}: unknown kind of file '{}', expected .msh .vtk .vtu .vtp .obj .ply or .stl",
+                             file.string(), extension));
 }
 
 }  // namespace palpate

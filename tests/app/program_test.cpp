@@ -230,6 +230,13 @@ TEST(Program, TheScenePageIsWhatTheProgramSaysOfItself) {
   EXPECT_THAT(page, HasSubstr(outcome.output)) << "docs/scene.md is behind: run ./dev docs";
 }
 
+TEST(Program, DocumentsItsInputsAsTheReadersListThem) {
+  const std::string page = read_file(std::filesystem::path(PALPATE_SOURCE_DIR) / "docs/inputs.md");
+  const Outcome outcome = run_palpate("--document-inputs");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(page, outcome.output) << "docs/inputs.md is behind: run ./dev docs";
+}
+
 /// Every name that a line of the library adds to the warnings of a frame.
 std::set<std::string> warnings_in_the_code() {
   static const std::regex kAdded("warnings\\.(push_back|emplace_back)\\(\"([a-z_]+)\"\\)");

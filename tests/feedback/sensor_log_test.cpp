@@ -1,9 +1,11 @@
 #include "palpate/feedback/sensor_log.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -64,23 +66,101 @@ TEST(SensorLog, ItsClockAxesZeroAndScaleAreFound) {
   EXPECT_EQ(found.frames, 100);
 }
 
-TEST(SensorLog, ReadsWhatAtisProgramsWriteAndSaysWhatIsMissing) {
-  const std::filesystem::path file = testing::TempDir() + "sensor_log_test.csv";
-  const auto write = [&file](const std::string& header, double step_s) {
-    std::ofstream stream(file);
-    stream << header << "\n";
-    for (int i = 0; i < 20; ++i) stream << "ok," << i * step_s << ",1,2,3,0,0,0\n";
+class SensorLogFile : public ::testing::Test {
+ protected:
+  /// 4 s of the log at 100 Hz, a row by `row_of(number, seconds, force)`.
+  template <class RowOf>
+  std::vector<SensorReading> read(const std::string& before, RowOf row_of) const {
+    std::ofstream stream(file_);
+    stream << before << "\n";
+    for (int i = 0; i < 600; ++i) stream << row_of(i, i / 100.0, Vec3(kScale * force_N(i / 100.0 - 1))) << "\n";
+    stream.close();
+    return read_sensor_log(file_, 4);
+  }
+  void expect_followed(const std::vector<SensorReading>& log) const {
+    const SensorComparison found = compare_with_sensor(video(), log);
+    EXPECT_NEAR(found.scale, kScale, 0.01);
+    EXPECT_GT(found.correlation, 0.999);
+    EXPECT_NEAR(log[1].time_s - log[0].time_s, 0.01, 1e-6);
+  }
+  std::string refusal(const std::string& text, double video_span_s = 4) const {
+    std::ofstream(file_) << text;
+    try {
+      read_sensor_log(file_, video_span_s);
+    } catch (const BadInput& error) {
+      return error.what();
+    }
+    return "";
+  }
+  void TearDown() override { std::filesystem::remove(file_); }
+
+  std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() /
+      (std::string("palpate_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv");
+};
+
+TEST_F(SensorLogFile, OfAtisNetFtHoldsCountsAndATimeOfDay) {
+  const std::string before =
+      "Start Time: 11/3/25 1:05 PM\nRDT Sample Rate: 100\nForce Units: N\nCounts per Unit Force: 1000000.0\n"
+      "Status (hex), RDT Sequence, F/T Sequence, Fx, Fy, Fz, Tx, Ty, Tz, Time";
+  const auto row = [](int i, double time_s, const Vec3& f) {
+    return fmt::format(
+        "\"0x00000000\",\"{}\",\"{}\",\"{:.0f}\",\"{:.0f}\",\"{:.0f}\",\"0\",\"0\",\"0\",\"11/3/25 1:05:{:06.3f} PM\"",
+        i + 1, 4000 + 7 * i, 1e6 * f.x(), 1e6 * f.y(), 1e6 * f.z(), 7 + time_s);
   };
-  write("Status,Time,Fx,Fy,Fz,Tx,Ty,Tz", 0.01);
-  const auto log = read_sensor_log(file);
+  expect_followed(read(before, row));
+  // A rate that was stated and not kept does not count, its stamps do.
+  std::string other_rate = before;
+  other_rate.replace(other_rate.find("Rate: 100"), 9, "Rate: 7000");
+  expect_followed(read(other_rate, row));
+  // Without a time there is the rate alone.
+  const std::vector<SensorReading> counted = read("Sample rate (Hz);100\nFx;Fy;Fz", [](int, double, const Vec3& f) {
+    return fmt::format("{};{};{}", f.x(), f.y(), f.z());
+  });
+  expect_followed(counted);
+}
+
+TEST_F(SensorLogFile, OfARobotOrOfALoggerWithItsOwnClock) {
+  expect_followed(
+      read("%time,field.header.seq,field.header.stamp,field.header.frame_id,field.wrench.force.x,field.wrench.force.y,"
+           "field.wrench.force.z",
+           [](int i, double time_s, const Vec3& f) {
+             const auto ns = 1700000000000000000LL + std::llround(time_s * 1e9);
+             return fmt::format("{},{},{},base,{},{},{}", ns + 12345, i, ns, f.x(), f.y(), f.z());
+           }));
+  expect_followed(read("Time (ms);Kraft X;Kraft Y;Kraft Z", [](int, double time_s, const Vec3& f) {
+    std::string row = fmt::format("{:.3f};{:.6f};{:.6f};{:.6f}", 1000 * time_s, f.x(), f.y(), f.z());
+    std::replace(row.begin(), row.end(), '.', ',');
+    return row;
+  }));
+  expect_followed(read("Time\tFx (mN)\tFy (mN)\tFz (mN)", [](int i, double, const Vec3& f) {
+    return fmt::format("{}\t{}\t{}\t{}", 10 * i, 1000 * f.x(), 1000 * f.y(), 1000 * f.z());
+  }));
+}
+
+TEST_F(SensorLogFile, MeansRowsOfOneTimeAndRefusesTimeThatRunsBackwards) {
+  std::string text = "Time,Fx,Fy,Fz\n";
+  for (int i = 0; i < 20; ++i) text += fmt::format("{},1,2,3\n{},3,2,{}\n", 0.02 * i, 0.02 * i, i);
+  std::ofstream(file_) << text;
+  const auto log = read_sensor_log(file_);
   ASSERT_EQ(log.size(), 20U);
-  EXPECT_EQ(log[3].force_N, Vec3(1, 2, 3));
-  write("Status,Time,Fx,Fy,Force,Tx,Ty,Tz", 0.01);
-  EXPECT_THAT([&] { read_sensor_log(file); },
-              testing::ThrowsMessage<BadInput>(testing::HasSubstr("no column fz_N (or Fz)")));
-  write("Status,Time,Fx,Fy,Fz,Tx,Ty,Tz", 0);
-  EXPECT_THAT([&] { read_sensor_log(file); }, testing::ThrowsMessage<BadInput>(testing::HasSubstr(":3: time 0 after")));
-  std::filesystem::remove(file);
+  EXPECT_EQ(log[5].force_N, Vec3(2, 2, 4));
+  EXPECT_THAT(refusal(text + "0.1,1,2,3\n", 0), testing::HasSubstr(":42: time 0.1 s after 0.38 s"));
+}
+
+TEST_F(SensorLogFile, SaysWhatIsMissing) {
+  EXPECT_THAT(refusal("Status,Time,Fx,Fy,Force\nok,0,1,2,3\n"),
+              testing::AllOf(testing::HasSubstr("no column fz_N"), testing::HasSubstr("Status,Time,Fx,Fy,Force")));
+  EXPECT_THAT(refusal("Time,Fx,Fy,Fz\n0,1,2,3\n"), testing::HasSubstr("expected at least 10"));
+}
+
+TEST(SensorLog, OfAnotherRecordingIsRefused) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal(0, 1);
+  std::vector<SensorReading> log;
+  for (int i = 0; i < 2000; ++i) log.push_back({i / 100.0, Vec3(normal(random), normal(random), normal(random))});
+  EXPECT_THAT([&] { compare_with_sensor(video(), log); },
+              testing::ThrowsMessage<BadInput>(testing::HasSubstr("does not follow the estimate")));
 }
 
 TEST(SensorLog, AnEstimateWithoutForceOrALogOfAnotherTimeCannotBeCompared) {

@@ -1,0 +1,253 @@
+#include "palpate/core/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "palpate/core/errors.h"
+#include "palpate/core/table_text.h"
+#include "palpate/core/units.h"
+
+namespace palpate {
+
+namespace {
+
+/// The header stands within these.
+constexpr int kLinesBeforeTable = 200;
+/// From so many rows it is told how numbers are written.
+constexpr size_t kRowsToJudge = 500;
+constexpr size_t kLongestHeaderShown = 160;
+
+std::string small(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// Index of the field that a header calls like this column; nothing where there is none.
+std::optional<size_t> field_of(const TableColumn& column, const std::vector<std::string_view>& header) {
+  std::vector<HeaderCell> cells;
+  for (const std::string_view cell : header) {
+    if (small(unquoted(cell)) == small(column.name)) return cells.size();
+    cells.push_back(header_cell(cell));
+  }
+  std::vector<std::string> keys = {header_cell(column.name).key};
+  for (const std::string& spelling : column.spellings) keys.push_back(header_cell(spelling).key);
+  // Our own name means the same to others only where they do not offer a better one.
+  if (keys.size() > 1) std::rotate(keys.begin(), keys.begin() + 1, keys.end());
+  for (const std::string& key : keys) {
+    for (size_t i = 0; i < cells.size(); ++i)
+      if (cells[i].key == key) return i;
+    for (size_t i = 0; i < cells.size(); ++i)
+      if (cells[i].key.ends_with("." + key)) return i;
+  }
+  return std::nullopt;
+}
+
+size_t count_found(const std::vector<TableColumn>& columns, const std::vector<std::string_view>& header) {
+  return static_cast<size_t>(
+      std::count_if(columns.begin(), columns.end(), [&](const auto& c) { return field_of(c, header).has_value(); }));
+}
+
+bool is_comment(std::string_view line) {
+  line = trimmed(line);
+  return line.starts_with('#') || line.starts_with('%');
+}
+
+bool is_number(std::string_view cell) {
+  std::string text = unquoted(cell);
+  std::replace(text.begin(), text.end(), ',', '.');
+  return std::isfinite(number_of(text));
+}
+
+/// "N", "(N)" and "[N]" are the same.
+std::string without_brackets(std::string_view cell) {
+  return header_cell("u (" + unquoted(cell) + ")").unit;
+}
+
+bool names_units(const std::vector<std::string_view>& fields) {
+  return std::none_of(fields.begin(), fields.end(), is_number) &&
+         std::any_of(fields.begin(), fields.end(),
+                     [](auto cell) { return unit_of(without_brackets(cell)).has_value(); });
+}
+
+/// "Counts per Unit Force: 1000000.0" in two.
+std::pair<std::string, std::string> key_and_value(std::string_view line) {
+  const std::string text = unquoted(line);
+  const size_t cut = text.find_first_of(":=;,\t");
+  if (cut == std::string::npos) return {small(text), ""};
+  return {small(unquoted(std::string_view(text).substr(0, cut))),
+          unquoted(trimmed(std::string_view(text).substr(cut + 1)))};
+}
+
+}  // namespace
+
+Table::Table(const std::filesystem::path& file, const std::vector<TableColumn>& columns) : file_(file) {
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(
+        fmt::format("{} {}, expected a table with a header that names its columns", file.string(), obstacle));
+  std::ostringstream content;
+  content << std::ifstream(file, std::ios::binary).rdbuf();
+  text_ = as_utf8(content.str());
+  find_header(columns);
+
+  LineSplitter lines(text_, separator_);
+  std::vector<std::string_view> fields, header, units;
+  size_t doubled = 0, judged = 0;
+  while (lines.next(fields)) {
+    const bool is_blank = trimmed(lines.whole()).empty();
+    if (lines.line() < header_line_) {
+      if (!is_blank) before_.push_back(key_and_value(lines.whole()));
+    } else if (lines.line() == header_line_) {
+      header = fields;
+    } else if (!is_blank && !is_comment(lines.whole())) {
+      if (rows_.empty() && units.empty() && names_units(fields)) {
+        units = fields;
+        continue;
+      }
+      rows_.push_back({lines.line(), cells_.size(), fields.size()});
+      cells_.insert(cells_.end(), fields.begin(), fields.end());
+      if (judged >= kRowsToJudge) continue;
+      ++judged;
+      doubled += fields.size() + 1 >= 2 * header.size() && header.size() > 1;
+    }
+  }
+  if (separator_ == ',' && judged > 0 && 2 * doubled > judged)
+    throw BadInput(
+        fmt::format("{}: rows have twice as many values as the {} columns named ({}): the comma both separates columns "
+                    "and marks decimals; expected semicolons between the columns, or decimal points",
+                    file_.string(), header.size(), header_found()));
+  columns_.clear();
+  for (const TableColumn& column : columns)
+    if (const auto field = field_of(column, header)) columns_[column.name].index = *field;
+  place_columns(columns, units.empty() ? header : units);
+  find_decimal_mark();
+}
+
+/// Separator and header together: the line that names most columns. Where none names any, the last line of words before
+/// the first row of numbers is shown to the user as the header.
+void Table::find_header(const std::vector<TableColumn>& columns) {
+  size_t most = 0, fields_of_shown = 0;
+  for (const char separator : {',', ';', '\t', '|', ' '}) {
+    LineSplitter lines(text_, separator);
+    std::vector<std::string_view> fields;
+    std::string last_words;
+    int last_line = 0;
+    for (int i = 0; i < kLinesBeforeTable && lines.next(fields); ++i) {
+      const size_t found = count_found(columns, fields);
+      if (found > most) {
+        most = found;
+        separator_ = separator;
+        header_line_ = lines.line();
+        header_ = std::string(trimmed(lines.whole()));
+      }
+      const bool has_numbers = std::count_if(fields.begin(), fields.end(), is_number) > 1;
+      if (!has_numbers && !trimmed(lines.whole()).empty() && fields_of_shown == 0) {
+        last_words = std::string(trimmed(lines.whole()));
+        last_line = lines.line();
+      }
+      if (most == 0 && has_numbers && fields.size() > fields_of_shown && last_line > 0) {
+        fields_of_shown = fields.size();
+        separator_ = separator;
+        header_ = last_words;
+        header_line_ = last_line;
+      }
+    }
+  }
+  if (header_line_ > 0) return;
+  LineSplitter lines(text_, separator_);
+  std::vector<std::string_view> fields;
+  while (lines.next(fields) && trimmed(lines.whole()).empty()) {
+  }
+  header_ = std::string(trimmed(lines.whole()));
+  header_line_ = lines.line();
+}
+
+void Table::place_columns(const std::vector<TableColumn>& columns, const std::vector<std::string_view>& units) {
+  for (const TableColumn& column : columns) {
+    const auto found = columns_.find(column.name);
+    if (found == columns_.end()) continue;
+    Place& place = found->second;
+    const std::optional<Unit> wanted = unit_of(header_cell(column.name).unit);
+    if (place.index >= units.size()) continue;
+    place.unit = header_cell(units[place.index]).unit;
+    if (place.unit.empty() && unit_of(without_brackets(units[place.index])))
+      place.unit = without_brackets(units[place.index]);
+    const std::optional<Unit> unit = unit_of(place.unit);
+    if (!wanted || place.unit.empty()) continue;
+    if (unit && unit->kind == wanted->kind)
+      place.factor = unit->factor / wanted->factor;
+    else if (unit || wanted->kind != Unit::Kind::time)  // "Time (hh:mm:ss)" is read as text
+      place.wrong_unit =
+          fmt::format("{}: column {} is in {}, expected {} or a unit that is turned into it; {}", file_.string(),
+                      unquoted(column.name), place.unit, house_unit(wanted->kind), header_found());
+  }
+}
+
+/// A comma marks decimals where numbers have commas and none has a point, or where it stands behind the points.
+void Table::find_decimal_mark() {
+  size_t commas = 0, points = 0, behind = 0;
+  for (size_t i = 0; i < std::min(rows_.size(), kRowsToJudge); ++i)
+    for (const auto& [name, place] : columns_) {
+      const std::string cell = text(rows_[i], name);
+      if (cell.find_first_not_of("+-0123456789.,eE ") != std::string::npos) continue;
+      const size_t comma = cell.rfind(','), point = cell.rfind('.');
+      commas += comma != std::string::npos;
+      points += point != std::string::npos;
+      behind += comma != std::string::npos && point != std::string::npos && comma > point;
+    }
+  decimal_comma_ = commas > 0 && (points == 0 || behind > 0);
+}
+
+void Table::require(const std::vector<std::string>& names) const {
+  for (const std::string& name : names)
+    if (!has(name)) throw BadInput(fmt::format("{}: no column {}; {}", file_.string(), name, header_found()));
+}
+
+std::string Table::text(const Row& row, const std::string& name) const {
+  const auto found = columns_.find(name);
+  if (found == columns_.end() || found->second.index >= row.cells) return "";
+  return unquoted(cells_[row.first_cell + found->second.index]);
+}
+
+double Table::number(const Row& row, const std::string& name) const {
+  const auto found = columns_.find(name);
+  if (found == columns_.end() || found->second.index >= row.cells) return std::numeric_limits<double>::quiet_NaN();
+  const Place& place = found->second;
+  if (!place.wrong_unit.empty()) throw BadInput(place.wrong_unit);
+  const std::string_view cell = trimmed(cells_[row.first_cell + place.index]);
+  if (!decimal_comma_ && cell.find_first_of("\",") == std::string_view::npos) return number_of(cell) * place.factor;
+  std::string number = unquoted(cell);
+  const auto remove = [&number](char c) { number.erase(std::remove(number.begin(), number.end(), c), number.end()); };
+  if (decimal_comma_) {
+    remove('.');
+    std::replace(number.begin(), number.end(), ',', '.');
+  } else if (number.find('.') != std::string::npos) {
+    remove(',');
+  }
+  return number_of(number) * place.factor;
+}
+
+std::string Table::stated_unit(const std::string& name) const {
+  const auto found = columns_.find(name);
+  return found == columns_.end() ? "" : found->second.unit;
+}
+
+std::optional<std::string> Table::before_header(const std::vector<std::string>& words) const {
+  for (const auto& [key, value] : before_)
+    if (std::all_of(words.begin(), words.end(),
+                    [&key = key](const std::string& word) { return key.find(word) != std::string::npos; }))
+      return value;
+  return std::nullopt;
+}
+
+std::string Table::header_found() const {
+  const bool is_long = header_.size() > kLongestHeaderShown;
+  return fmt::format("the header in line {} is '{}{}'", header_line_, header_.substr(0, kLongestHeaderShown),
+                     is_long ? "..." : "");
+}
+
+}  // namespace palpate

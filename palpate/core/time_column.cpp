@@ -1,0 +1,135 @@
+#include "palpate/core/time_column.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <regex>
+
+#include "palpate/core/errors.h"
+#include "palpate/core/units.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kHour_s = 3600, kDay_s = 86400;
+
+/// Time of day of one cell, and after how long it begins anew.
+struct Clock {
+  double time_s = kNone;
+  double period_s = kDay_s;
+};
+
+Clock clock_of(const std::string& text) {
+  static const std::regex kTime(R"((?:^|[ T/])(\d{1,2}):(\d{2})(?::(\d{2}))?(?:[.,](\d+))?\s*([aApP][mM])?)");
+  std::smatch found;
+  if (!std::regex_search(text, found, kTime)) return {};
+  const double first = std::stod(found[1]), second = std::stod(found[2]);
+  const double fraction = found[4].length() ? std::stod("0." + found[4].str()) : 0;
+  if (!found[3].length()) {
+    if (!found[4].length()) return {};  // hours and minutes tell no force from the next
+    return {60 * first + second + fraction, kHour_s};
+  }
+  double hours = first;
+  if (found[5].length()) hours = std::fmod(hours, 12) + (std::tolower(found[5].str()[0]) == 'p' ? 12 : 0);
+  return {kHour_s * hours + 60 * second + std::stod(found[3]) + fraction, kDay_s};
+}
+
+std::vector<double> times_of_day(const Table& table) {
+  std::vector<double> times;
+  double before = kNone, begun_anew_s = 0;
+  for (const Table::Row& row : table.rows()) {
+    const Clock clock = clock_of(table.text(row, "time_s"));
+    if (clock.time_s < before - 0.5 * clock.period_s) begun_anew_s += clock.period_s;
+    if (!std::isnan(clock.time_s)) before = clock.time_s;
+    times.push_back(clock.time_s + begun_anew_s);
+  }
+  return times;
+}
+
+/// First, last and median step of the numbers that are there.
+struct Extent {
+  double first = kNone, last = kNone, step = 0;
+};
+
+Extent extent_of(const std::vector<double>& times) {
+  Extent extent;
+  std::vector<double> steps;
+  for (const double time : times) {
+    if (std::isnan(time)) continue;
+    if (std::isnan(extent.first)) extent.first = time;
+    if (time > extent.last) steps.push_back(time - extent.last);
+    extent.last = time;
+  }
+  if (!steps.empty()) {
+    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+    extent.step = steps[steps.size() / 2];
+  }
+  return extent;
+}
+
+/// Of the units that make the steps credible and the rows long enough, the one by which the rows last most nearly as
+/// long as what they belong to.
+double seconds_per_unit(const Table& table, const Extent& extent, const TimeHints& hints) {
+  const double length = extent.last - extent.first;
+  std::optional<double> best;
+  double best_distance = std::numeric_limits<double>::infinity();
+  for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
+    const double step_s = extent.step * unit, length_s = length * unit;
+    if (step_s > hints.longest_step_s || step_s < hints.shortest_step_s || length_s < 0.5 * hints.span_s) continue;
+    const double distance = hints.span_s > 0 ? std::abs(std::log(length_s / hints.span_s)) : 0;
+    if (distance >= best_distance) continue;
+    best = unit;
+    best_distance = distance;
+  }
+  if (best) return *best;
+  const std::string wanted = hints.span_s > 0 ? fmt::format(" and at least half of {:g} s long", hints.span_s) : "";
+  throw BadInput(
+      fmt::format("{}: the time goes from {:.15g} to {:.15g} in steps of {:g}, which is neither in seconds nor in ms, "
+                  "us or ns a log "
+                  "with {:g} to {:g} s between rows{}; {}",
+                  table.file().string(), extent.first, extent.last, extent.step, hints.shortest_step_s,
+                  hints.longest_step_s, wanted, table.header_found()));
+}
+
+}  // namespace
+
+std::vector<TableColumn> time_columns() {
+  return {{"time_s",
+           {"header.stamp", "stamp", "timestamp", "time", "t", "elapsedtime", "elapsed", "seconds", "sec", "timeofday",
+            "datetime", "clock", "rosbagtimestamp", "xvalue", "zeit", "temps"}},
+          {"stamp.secs", {"stamp.sec", "secs", "sec"}},
+          {"stamp.nsecs", {"stamp.nanosec", "nsecs", "nanosec"}}};
+}
+
+std::vector<double> times_s(const Table& table, const TimeHints& hints) {
+  std::vector<double> times;
+  if (table.has("stamp.secs") && table.has("stamp.nsecs")) {
+    for (const Table::Row& row : table.rows())
+      times.push_back(table.number(row, "stamp.secs") + 1e-9 * table.number(row, "stamp.nsecs"));
+    return times;
+  }
+  table.require({"time_s"});
+  for (const Table::Row& row : table.rows()) times.push_back(table.number(row, "time_s"));
+  const bool none = std::all_of(times.begin(), times.end(), [](double time) { return std::isnan(time); });
+  if (none && !table.rows().empty()) return times_of_day(table);
+  const std::optional<Unit> stated = unit_of(table.stated_unit("time_s"));
+  const Extent extent = extent_of(times);
+  if (!(extent.step > 0)) return times;
+  if (stated && stated->kind == Unit::Kind::time) {
+    if (hints.span_s > 0 && extent.step > 0.1 * hints.span_s)
+      throw BadInput(fmt::format(
+          "{}: rows are {:g} s apart by their time, too far for {:g} s of video; is column time in {}? {}",
+          table.file().string(), extent.step, hints.span_s, table.stated_unit("time_s"), table.header_found()));
+    return times;
+  }
+  const double unit = seconds_per_unit(table, extent, hints);
+  for (double& time : times) time *= unit;
+  return times;
+}
+
+}  // namespace palpate

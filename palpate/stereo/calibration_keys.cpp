@@ -1,0 +1,419 @@
+#include "palpate/stereo/calibration_keys.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "palpate/core/settings.h"
+
+namespace palpate {
+
+namespace {
+
+using Role = CalibrationRole;
+using Eye = CalibrationEye;
+
+constexpr size_t kMostKeysShown = 16;
+
+bool is_upper(char c) {
+  return std::isupper(static_cast<unsigned char>(c)) != 0;
+}
+bool is_lower(char c) {
+  return std::islower(static_cast<unsigned char>(c)) != 0;
+}
+bool is_digit(char c) {
+  return std::isdigit(static_cast<unsigned char>(c)) != 0;
+}
+
+/// "cameraMatrix_left1" is camera, matrix, left, 1.
+std::vector<std::string> words_of(const std::string& key) {
+  std::vector<std::string> words;
+  std::string word;
+  const auto end_word = [&] {
+    if (!word.empty()) words.push_back(word);
+    word.clear();
+  };
+  for (size_t i = 0; i < key.size(); ++i) {
+    const char c = key[i];
+    if (!std::isalnum(static_cast<unsigned char>(c))) {
+      end_word();
+      continue;
+    }
+    const bool after_digit = i > 0 && is_digit(key[i - 1]);
+    if (i > 0 && ((is_upper(c) && is_lower(key[i - 1])) || is_digit(c) != after_digit)) end_word();
+    word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  end_word();
+  return words;
+}
+
+const std::map<std::string, Role>& roles_by_name() {
+  static const std::map<std::string, Role> kRoles = [] {
+    std::map<std::string, Role> roles;
+    const auto add = [&roles](Role role, const std::vector<std::string>& names) {
+      for (const std::string& name : names) roles[name] = role;
+    };
+    add(Role::camera_matrix, {"k",
+                              "m",
+                              "a",
+                              "mtx",
+                              "mat",
+                              "cm",
+                              "camera",
+                              "cameramatrix",
+                              "kk",
+                              "intrinsic",
+                              "intrinsics",
+                              "intrinsicmtx",
+                              "mtxintrinsic",
+                              "intrinsicmatrix",
+                              "intrinsicsmatrix",
+                              "cameramat",
+                              "cammat",
+                              "cammatrix",
+                              "cameramtx",
+                              "cammtx",
+                              "kmatrix",
+                              "matrix",
+                              "cam",
+                              "cameraintrinsics",
+                              "cameraintrinsicmatrix",
+                              "intrinsicparameters",
+                              "newcameramatrix"});
+    add(Role::distortion, {"d",
+                           "dist",
+                           "distortion",
+                           "distcoeffs",
+                           "distcoeff",
+                           "distcoefs",
+                           "distcoef",
+                           "distortioncoefficients",
+                           "distortioncoefficient",
+                           "distortioncoeffs",
+                           "distortioncoeff",
+                           "distortioncoefs",
+                           "distortionvector",
+                           "distortionparameters",
+                           "distortionparams",
+                           "distortioncoefficents",
+                           "kc",
+                           "dc",
+                           "coeffs",
+                           "coefficients",
+                           "distcoefficients",
+                           "cameradistortion",
+                           "distvec",
+                           "distortionparameter",
+                           "dcoeffs"});
+    add(Role::rotation, {"r",
+                         "rot",
+                         "rotation",
+                         "rotationmatrix",
+                         "rotmat",
+                         "rmat",
+                         "om",
+                         "rvec",
+                         "rotationvector",
+                         "stereor",
+                         "rotmatrix",
+                         "rodrigues",
+                         "rotationofcamera",
+                         "extrinsicrotation",
+                         "rstereo",
+                         "rotationlefttoright",
+                         "rlefttoright",
+                         "rl2r",
+                         "rlr",
+                         "extrinsicsr"});
+    add(Role::translation,
+        {"t", "trans", "translation", "translationvector", "transvec", "tvec", "tmat", "translationofcamera", "stereot",
+         "tstereo", "translationmatrix", "extrinsictranslation", "translationlefttoright", "tlefttoright", "tl2r",
+         "tlr", "transmat", "transvector", "extrinsicst"});
+    add(Role::transform, {"tcncnm", "transform", "extrinsic", "extrinsics", "extrinsicmatrix", "extrinsicsmatrix",
+                          "lefttoright", "l2r", "left2right", "stereotransform", "rt", "tlr", "trl", "cameraextrinsic",
+                          "cameraextrinsics", "rightfromleft", "transformation", "transformationmatrix", "posecamera"});
+    add(Role::rectification, {"rect", "rectification", "rectificationmatrix", "rectificationrotation", "rrect"});
+    add(Role::projection, {"p", "proj", "projection", "projectionmatrix", "prect"});
+    add(Role::image_size, {"imagesize", "size", "resolution", "imgsize", "imagesizepx", "imageresolution", "framesize",
+                           "camerasize", "res", "imagedimensions"});
+    add(Role::distortion_model,
+        {"distortionmodel", "distortiontype", "lensmodel", "lens", "cameramodel", "model", "fisheye", "isfisheye",
+         "calibrationmodel", "projectionmodel", "cameratype", "modeltype"});
+    add(Role::focal, {"fc", "f", "focallength", "focal", "focalpx"});
+    add(Role::principal, {"cc", "c", "principalpoint", "opticalcenter", "center", "principal", "pp"});
+    add(Role::radial, {"radialdistortion", "radial"});
+    add(Role::tangential, {"tangentialdistortion", "tangential"});
+    return roles;
+  }();
+  return kRoles;
+}
+
+/// Names of single numbers, as they are called elsewhere and as they are called here.
+const std::map<std::string, std::string>& coefficient_names() {
+  static const std::map<std::string, std::string> kNames = {
+      {"fx", "fx"},
+      {"fcx", "fx"},
+      {"focallengthx", "fx"},
+      {"focalx", "fx"},
+      {"alphax", "fx"},
+      {"fy", "fy"},
+      {"fcy", "fy"},
+      {"focallengthy", "fy"},
+      {"focaly", "fy"},
+      {"alphay", "fy"},
+      {"cx", "cx"},
+      {"ccx", "cx"},
+      {"u0", "cx"},
+      {"ppx", "cx"},
+      {"principalpointx", "cx"},
+      {"x0", "cx"},
+      {"cy", "cy"},
+      {"ccy", "cy"},
+      {"v0", "cy"},
+      {"ppy", "cy"},
+      {"principalpointy", "cy"},
+      {"y0", "cy"},
+      {"f", "f"},
+      {"focal", "f"},
+      {"focallength", "f"},
+      {"focalpx", "f"},
+      {"k1", "k1"},
+      {"k2", "k2"},
+      {"k3", "k3"},
+      {"k4", "k4"},
+      {"k5", "k5"},
+      {"k6", "k6"},
+      {"p1", "p1"},
+      {"p2", "p2"},
+      {"baseline", "baseline"},
+      {"baselinemm", "baseline"},
+      {"baselinem", "baseline"},
+      {"imagewidth", "width"},
+      {"width", "width"},
+      {"resx", "width"},
+      {"imgwidth", "width"},
+      {"w", "width"},
+      {"imageheight", "height"},
+      {"height", "height"},
+      {"resy", "height"},
+      {"imgheight", "height"},
+      {"h", "height"},
+  };
+  return kNames;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  return std::accumulate(words.begin(), words.end(), std::string());
+}
+
+/// Side as words say it; numbers are settled when the whole file is known.
+struct Side {
+  Eye eye = Eye::unknown;
+  int number = -1;
+};
+
+/// Takes the words that name an eye out of `words`, unless nothing else would be left.
+Side take_side(std::vector<std::string>& words, bool may_be_empty) {
+  Side side;
+  std::vector<std::string> rest;
+  for (const std::string& word : words) {
+    if (word == "left" || word == "l" || word == "lft")
+      side.eye = Eye::left;
+    else if (word == "right" || word == "r" || word == "rgt")
+      side.eye = Eye::right;
+    else if (word == "0" || word == "1" || word == "2" || word == "00" || word == "01" || word == "02")
+      side.number = word.back() - '0';
+    else
+      rest.push_back(word);
+  }
+  if (rest.empty() && !may_be_empty) return {};
+  words = rest;
+  return side;
+}
+
+/// KL, DR, mtxL: a name that ends with the letter of its eye.
+Side take_last_letter(std::string& name) {
+  static const std::set<std::string> kStems = {"k", "m", "d", "p", "kk", "kc", "mtx", "dist", "cm", "fc", "cc", "rect"};
+  if (name.size() < 2) return {};
+  const char last = name.back();
+  const std::string stem = name.substr(0, name.size() - 1);
+  if ((last != 'l' && last != 'r') || !kStems.count(stem)) return {};
+  name = stem;
+  return {last == 'l' ? Eye::left : Eye::right, -1};
+}
+
+std::vector<std::string> segments_of(const std::string& path) {
+  std::vector<std::string> segments = {""};
+  for (const char c : path) {
+    if (c == '.' || c == '[') segments.emplace_back();
+    if (c != '.' && c != '[' && c != ']') segments.back() += c;
+  }
+  std::erase(segments, "");
+  return segments;
+}
+
+Role by_size(Role role, const std::string& name, size_t count) {
+  const bool says_camera = role == Role::camera_matrix || name.find("intrinsic") != std::string::npos ||
+                           name.find("cameramatrix") != std::string::npos;
+  const bool says_pose = role == Role::transform || name.find("extrinsic") != std::string::npos ||
+                         name.find("l2r") != std::string::npos || name.find("lefttoright") != std::string::npos;
+  if (says_pose)
+    return count == 9                   ? Role::rotation
+           : count == 3                 ? Role::translation
+           : count == 12 || count == 16 ? Role::transform
+                                        : Role::none;
+  if (says_camera) {
+    if (count == 9) return Role::camera_matrix;
+    if (count == 4) return Role::intrinsics;
+    if (count == 12) return Role::projection;
+    return (count == 5 || count == 8 || count == 14) ? Role::distortion : Role::none;
+  }
+  if (role == Role::none && name.find("distort") != std::string::npos) role = Role::distortion;
+  if (role == Role::none && name.find("rotation") != std::string::npos) role = Role::rotation;
+  if (role == Role::none && name.find("translation") != std::string::npos) role = Role::translation;
+  if (role == Role::none && name.find("rectif") != std::string::npos) role = Role::rectification;
+  if (role == Role::none && name.find("projection") != std::string::npos) role = Role::projection;
+  if (role == Role::rotation && count == 16) return Role::transform;
+  if (role == Role::translation && count == 16) return Role::transform;
+  const std::map<Role, std::set<size_t>> counts = {
+      {Role::rotation, {3, 9}}, {Role::translation, {3}}, {Role::rectification, {9}},
+      {Role::projection, {12}}, {Role::image_size, {2}},  {Role::focal, {2}},
+      {Role::principal, {2}},   {Role::radial, {2, 3}},   {Role::tangential, {2}}};
+  if (const auto found = counts.find(role); found != counts.end() && !found->second.count(count)) return Role::none;
+  return role;
+}
+
+struct Recognised {
+  CalibrationValue value;
+  Side side;
+};
+
+Recognised recognise(const CalibrationEntry& entry) {
+  const std::vector<std::string> segments = segments_of(entry.path);
+  Recognised result;
+  result.value.entry = &entry;
+  Side side, own;
+  for (size_t i = 0; i + 1 < segments.size(); ++i) {
+    std::vector<std::string> words = words_of(segments[i]);
+    if (const Side found = take_side(words, true); found.eye != Eye::unknown || found.number >= 0) side = found;
+  }
+  const std::string last = segments.empty() ? "" : segments.back();
+  std::vector<std::string> words = words_of(last);
+  std::string whole = joined(words);
+  const bool is_number = entry.numbers.size() == 1;
+  if (is_number && coefficient_names().count(whole)) {
+    result.value.role = Role::coefficient;
+    result.value.name = coefficient_names().at(whole);
+    result.side = side;
+    return result;
+  }
+  // "R" and "l2r" are names, no sides; "tcncnm1" counts cameras.
+  const bool names_pair = whole.find("l2r") != std::string::npos || whole.find("lefttoright") != std::string::npos ||
+                          whole.find("left2right") != std::string::npos || whole.starts_with("tcncnm");
+  std::string name = whole;
+  if (whole == "tcncnm1") name = "tcncnm";
+  if (!names_pair) {
+    own = take_side(words, false);
+    name = joined(words);
+    if (own.eye == Eye::unknown && own.number < 0) own = take_last_letter(name);
+  }
+  if (is_number && coefficient_names().count(name)) {
+    result.value.role = Role::coefficient;
+    result.value.name = coefficient_names().at(name);
+    result.side = own.eye != Eye::unknown || own.number >= 0 ? own : side;
+    return result;
+  }
+  const auto& roles = roles_by_name();
+  auto found = roles.find(name);
+  // "left.camera.data" and "distortion.coefficients" say it with the key above.
+  if ((found == roles.end() || name == "coefficients" || name == "matrix") && segments.size() > 1) {
+    std::vector<std::string> above = words_of(segments[segments.size() - 2]);
+    take_side(above, true);
+    if (const auto both = roles.find(joined(above) + name); both != roles.end()) found = both;
+    if (found == roles.end() && (name == "data" || name == "value" || name == "values" || name == "a"))
+      found = roles.find(joined(above));
+  }
+  Role role = found == roles.end() ? Role::none : found->second;
+  if (entry.numbers.empty()) {
+    result.value.role = role == Role::distortion_model ? role : Role::none;
+  } else if (role == Role::distortion_model) {
+    result.value.role = role;
+  } else {
+    if (role == Role::distortion && entry.numbers.size() == 9) role = Role::none;
+    if (name == "k" && entry.numbers.size() != 9 && entry.numbers.size() >= 4) role = Role::distortion;
+    result.value.role = role == Role::distortion ? role : by_size(role, whole, entry.numbers.size());
+    // R1 and P1 of cv::stereoRectify; RotationOfCamera2 is the one rotation there is.
+    const bool numbered = own.number >= 0 || own.eye != Eye::unknown;
+    if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9)
+      result.value.role = Role::rectification;
+    if (name == "rotationofcamera" || name == "translationofcamera") own = side = {};
+    if (result.value.role == Role::transform) own = side = {};
+  }
+  result.side = own.eye != Eye::unknown || own.number >= 0 ? own : side;
+  return result;
+}
+
+}  // namespace
+
+std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& entries) {
+  std::vector<Recognised> found;
+  bool from_zero = false;
+  for (const CalibrationEntry& entry : entries) {
+    found.push_back(recognise(entry));
+    from_zero = from_zero || (found.back().side.number == 0 && found.back().value.role != Role::none);
+  }
+  std::vector<CalibrationValue> values;
+  for (const Recognised& one : found) {
+    CalibrationValue value = one.value;
+    value.eye = one.side.eye;
+    if (value.eye == Eye::unknown && one.side.number >= 0) {
+      const int first = from_zero ? 0 : 1;
+      value.eye = one.side.number == first ? Eye::left : one.side.number == first + 1 ? Eye::right : Eye::unknown;
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
+std::string keys_there(const std::vector<CalibrationEntry>& entries) {
+  static const std::vector<std::string> kExpected = {"M1",
+                                                     "M2",
+                                                     "K1",
+                                                     "K2",
+                                                     "D1",
+                                                     "D2",
+                                                     "R",
+                                                     "T",
+                                                     "cameraMatrix1",
+                                                     "cameraMatrix2",
+                                                     "distCoeffs1",
+                                                     "distCoeffs2",
+                                                     "camera_matrix",
+                                                     "camera_matrix_left",
+                                                     "camera_matrix_right",
+                                                     "distortion_coefficients",
+                                                     "rectification_matrix",
+                                                     "projection_matrix",
+                                                     "intrinsics",
+                                                     "distortion_coeffs",
+                                                     "T_cn_cnm1",
+                                                     "rotation",
+                                                     "translation"};
+  std::vector<std::string> shown;
+  std::string nearest;
+  for (const CalibrationEntry& entry : entries) {
+    if (shown.size() < kMostKeysShown) shown.push_back(entry.path);
+    if (!nearest.empty() || recognise(entry).value.role != Role::none) continue;
+    if (const std::string expected = nearest_word(entry.path, kExpected); !expected.empty())
+      nearest = fmt::format("; '{}' is nearest to '{}'", entry.path, expected);
+  }
+  return fmt::format("the keys there are {}{}{}", fmt::join(shown, ", "), entries.size() > shown.size() ? ", ..." : "",
+                     nearest);
+}
+
+}  // namespace palpate

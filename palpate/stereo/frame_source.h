@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/geometry.h"
+
+namespace palpate {
+
+/// Images of one camera (or of both in one picture), one after the other, with their times.
+class FrameSource {
+ public:
+  struct Frame {
+    cv::Mat image;      ///< 8-bit BGR
+    double time_s = 0;  ///< presentation stamp; of a live source, 0
+  };
+
+  virtual ~FrameSource() = default;
+  virtual std::optional<Frame> next() = 0;
+  virtual cv::Size size() const = 0;
+  /// By which stamps can be compared with those of another source: "mpegts", "numbers", ...
+  virtual std::string clock() const = 0;
+  /// Of every frame, ascending; empty = not known (live sources).
+  virtual const std::vector<double>& stamps_s() const = 0;
+  /// Frames per second that the source states; 0 = none.
+  virtual double stated_fps() const = 0;
+  /// Frames that the header of a file states, where the file is cut and holds fewer; 0 = it is whole.
+  virtual int frames_if_whole() const { return 0; }
+  /// Its pictures are made of two moments, in every second row.
+  virtual bool is_interlaced() const { return false; }
+};
+
+/// `key` names the source in sentences: "recording.left". `fps` numbers images whose names hold no time; 0 = as usual.
+/// Throws BadInput: missing, empty, not to be opened.
+std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps);
+
+/// A video file by FFmpeg: edit lists, empty chunks and a start other than zero are in the stamps.
+std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key);
+
+/// Images of a pattern such as left_%04d.png or %04d/left.png, by rising number, gaps allowed; empty where the path
+/// holds no placeholder. `%%` is a percent sign.
+struct NumberedFile {
+  long long number = 0;
+  std::filesystem::path file;
+};
+std::vector<NumberedFile> files_of_pattern(const std::filesystem::path& pattern);
+bool has_placeholder(const std::filesystem::path& pattern);
+
+}  // namespace palpate

@@ -1,0 +1,420 @@
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <optional>
+
+#include "palpate/core/errors.h"
+#include "palpate/stereo/calibration_keys.h"
+#include "palpate/stereo/calibration_tree.h"
+#include "palpate/stereo/check_rig.h"
+#include "palpate/stereo/input_kinds.h"
+#include "palpate/stereo/rig.h"
+
+namespace palpate {
+namespace {
+
+using Role = CalibrationRole;
+using Eye = CalibrationEye;
+using Numbers = std::vector<double>;
+
+constexpr double kMostBaseline_mm = 200;
+
+/// What a file says of one camera, or, of Eye::unknown, of the pair or of the only camera in it.
+struct Said {
+  std::map<Role, Numbers> values;
+  std::map<std::string, double> coefficients;
+  std::string model;
+
+  const Numbers* find(Role role) const {
+    const auto found = values.find(role);
+    return found == values.end() ? nullptr : &found->second;
+  }
+  double coefficient(const std::string& name, double otherwise = 0) const {
+    const auto found = coefficients.find(name);
+    return found == coefficients.end() ? otherwise : found->second;
+  }
+};
+
+struct Calibration {
+  std::filesystem::path file;
+  std::vector<CalibrationEntry> entries;
+  std::array<Said, 3> said;  // by Eye
+  bool by_matlab = false;
+
+  Said& of(Eye eye) { return said[static_cast<size_t>(eye)]; }
+  const Said& of(Eye eye) const { return said[static_cast<size_t>(eye)]; }
+};
+
+[[noreturn]] void refuse(const Calibration& calibration, const std::string& why) {
+  throw BadInput(fmt::format("{}: {}; {}", calibration.file.string(), why, keys_there(calibration.entries)));
+}
+
+std::string small(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+void sort_in(Calibration& calibration) {
+  for (const CalibrationValue& value : recognised(calibration.entries)) {
+    const CalibrationEntry& entry = *value.entry;
+    if (value.role != Role::none &&
+        !std::all_of(entry.numbers.begin(), entry.numbers.end(), [](double number) { return std::isfinite(number); }))
+      throw BadInput(fmt::format("{}: {} is [{:.6g}], expected finite numbers", calibration.file.string(), entry.path,
+                                 fmt::join(entry.numbers, ", ")));
+    calibration.by_matlab = calibration.by_matlab || small(entry.path).find("cameraparameters") != std::string::npos;
+    Said& said = calibration.of(value.eye);
+    if (value.role == Role::coefficient) {
+      said.coefficients.emplace(value.name, entry.numbers.front());
+    } else if (value.role == Role::distortion_model) {
+      const bool is_flag = small(entry.path).find("fisheye") != std::string::npos;
+      const bool is_set = entry.text == "true" || (!entry.numbers.empty() && entry.numbers.front() != 0);
+      if (is_flag && is_set) said.model += " fisheye";
+      if (!is_flag) said.model += " " + small(entry.text);
+    } else if (value.role != Role::none) {
+      said.values.emplace(value.role, entry.numbers);
+    }
+  }
+}
+
+Calibration calibration_of(const std::filesystem::path& file) {
+  Calibration calibration{file, read_calibration_tree(file), {}, false};
+  sort_in(calibration);
+  return calibration;
+}
+
+bool has_camera(const Said& said) {
+  return said.find(Role::camera_matrix) || said.find(Role::intrinsics) || said.find(Role::projection) ||
+         said.find(Role::focal) || said.coefficients.count("fx");
+}
+bool has_pose(const Calibration& calibration) {
+  for (const Eye eye : {Eye::unknown, Eye::right})
+    for (const Role role : {Role::translation, Role::transform})
+      if (calibration.of(eye).find(role)) return true;
+  return calibration.of(Eye::unknown).coefficients.count("baseline") > 0;
+}
+bool both_projected(const Calibration& calibration) {
+  return calibration.of(Eye::left).find(Role::projection) && calibration.of(Eye::right).find(Role::projection);
+}
+
+/// The camera matrix, wherever its numbers stand.
+std::optional<cv::Matx33d> camera_matrix_of(const Said& eye, const Said& both) {
+  if (const Numbers* K = eye.find(Role::camera_matrix)) return cv::Matx33d(K->data());
+  const auto from = [](double fx, double fy, double cx, double cy) {
+    return cv::Matx33d(fx, 0, cx, 0, fy, cy, 0, 0, 1);
+  };
+  if (const Numbers* n = eye.find(Role::intrinsics)) return from((*n)[0], (*n)[1], (*n)[2], (*n)[3]);
+  if (const Numbers* f = eye.find(Role::focal), *c = eye.find(Role::principal); f && c)
+    return from((*f)[0], (*f)[1], (*c)[0], (*c)[1]);
+  for (const Said* said : {&eye, &both}) {
+    const double f = said->coefficient("f"), fx = said->coefficient("fx", f);
+    if (fx > 0 && said->coefficients.count("cx") && said->coefficients.count("cy"))
+      return from(fx, said->coefficient("fy", fx), said->coefficient("cx"), said->coefficient("cy"));
+  }
+  if (const Numbers* P = eye.find(Role::projection))
+    return cv::Matx33d((*P)[0], (*P)[1], (*P)[2], (*P)[4], (*P)[5], (*P)[6], (*P)[8], (*P)[9], (*P)[10]);
+  return std::nullopt;
+}
+
+/// Nothing where the file says nothing of it.
+std::optional<Numbers> distortion_of(const Said& said) {
+  if (const Numbers* D = said.find(Role::distortion)) return *D;
+  if (const Numbers* radial = said.find(Role::radial)) {
+    const Numbers* tangential = said.find(Role::tangential);
+    Numbers D = {(*radial)[0], (*radial)[1], tangential ? (*tangential)[0] : 0, tangential ? (*tangential)[1] : 0};
+    if (radial->size() == 3) D.push_back((*radial)[2]);
+    return D;
+  }
+  if (!said.coefficients.count("k1")) return std::nullopt;
+  if (said.coefficients.count("k4") && !said.coefficients.count("p1"))
+    return Numbers{said.coefficient("k1"), said.coefficient("k2"), said.coefficient("k3"), said.coefficient("k4")};
+  return Numbers{said.coefficient("k1"), said.coefficient("k2"), said.coefficient("p1"), said.coefficient("p2"),
+                 said.coefficient("k3")};
+}
+
+bool is_transposed(const cv::Matx33d& K) {
+  return K(2, 2) == 1 && K(0, 2) == 0 && K(1, 2) == 0 && (K(2, 0) != 0 || K(2, 1) != 0);
+}
+
+/// Tangential distortion above this does not exist in a lens that somebody glued straight; below the smaller one four
+/// numbers are k1 k2 p1 p2.
+constexpr double kLargestTangential = 0.02, kUsualTangential = 0.01;
+
+LensModel lens_of(const Calibration& calibration, const Said& said, const Numbers& D, const char* eye) {
+  const std::string model = said.model + calibration.of(Eye::unknown).model;
+  const auto says = [&model](std::initializer_list<const char*> words) {
+    return std::any_of(words.begin(), words.end(), [&](const char* w) { return model.find(w) != std::string::npos; });
+  };
+  if (says({"omni", "eucm", "double_sphere", "ds-none", "fov"}))
+    refuse(calibration, fmt::format("the lens model of the {} camera is{}, expected plumb_bob (k1 k2 p1 p2 k3), "
+                                    "rational_polynomial or a fisheye model (equidistant, Kannala-Brandt)",
+                                    eye, model));
+  if (says({"fisheye", "equidistant", "kannala", "kb4", "equi"})) {
+    if (D.size() != 4)
+      refuse(calibration,
+             fmt::format("the lens model of the {} camera is{}, expected 4 coefficients (k1 k2 k3 k4) where "
+                         "there are {}, or distortion_model plumb_bob",
+                         eye, model, D.size()));
+    return LensModel::fisheye;
+  }
+  if (D.size() != 4 || says({"plumb", "radtan", "rational", "brown", "radial"})) return LensModel::brown;
+  const double tangential = std::max(std::abs(D[2]), std::abs(D[3]));
+  if (tangential > kLargestTangential) return LensModel::fisheye;
+  if (tangential <= kUsualTangential) return LensModel::brown;
+  refuse(calibration,
+         fmt::format(
+             "the four distortion coefficients of the {} camera can be k1 k2 p1 p2 or, with {:g} and {:g} in third "
+             "and fourth place, k1 k2 k3 k4 of a fisheye lens; say which by distortion_model: plumb_bob or "
+             "distortion_model: fisheye in the file",
+             eye, D[2], D[3]));
+}
+
+Camera camera_of(const Calibration& calibration, Eye side, StereoRig& rig) {
+  const char* eye = side == Eye::left ? "left" : "right";
+  const int number = side == Eye::left ? 1 : 2;
+  const Said& said = calibration.of(side);
+  const auto K = camera_matrix_of(said, calibration.of(Eye::unknown));
+  if (!K)
+    refuse(calibration, fmt::format("no camera matrix of the {} camera, expected M{} (or K{}, cameraMatrix{}, "
+                                    "camera_matrix_{}, {}.K, cam{}.intrinsics ...)",
+                                    eye, number, number, number, eye, eye, number - 1));
+  Camera camera;
+  camera.K = *K;
+  const bool transposed = is_transposed(camera.K);
+  if (transposed) camera.K = camera.K.t();
+  if (transposed || calibration.by_matlab) {
+    camera.K(0, 2) -= 1;
+    camera.K(1, 2) -= 1;
+    rig.notes.push_back(fmt::format("{} camera matrix as MATLAB writes it: {}pixels counted from 1, turned into ours",
+                                    eye, transposed ? "transposed, " : ""));
+  }
+  if (const auto D = distortion_of(said)) {
+    camera.distortion = *D;
+    camera.lens = lens_of(calibration, said, *D, eye);
+    if (camera.lens == LensModel::fisheye)
+      rig.notes.push_back(fmt::format("{} camera: fisheye lens (Kannala-Brandt, k1 k2 k3 k4)", eye));
+  } else if (!said.find(Role::projection) && !calibration.of(Eye::unknown).coefficients.count("baseline")) {
+    refuse(calibration, fmt::format("no distortion of the {} camera, expected D{} (or distCoeffs{}, "
+                                    "distortion_coefficients_{}, cam{}.distortion_coeffs ...)",
+                                    eye, number, number, eye, number - 1));
+  }
+  return camera;
+}
+
+Mat3 rotation_from(const Numbers& numbers) {
+  cv::Mat rotation(3, 3, CV_64F);
+  if (numbers.size() == 3)
+    cv::Rodrigues(cv::Vec3d(numbers.data()), rotation);
+  else
+    rotation = cv::Mat(cv::Matx33d(numbers.data()));
+  Mat3 result;
+  cv::cv2eigen(rotation, result);
+  return result;
+}
+
+Vec3 vector_from(const Numbers& numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+struct Pose {
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();
+};
+
+/// In a rectified pair x_right = x_left + (P_right[0,3] / P_right[0,0], 0, 0), each in its rectified axes.
+Pose pose_of_projections(const Said& left, const Said& right) {
+  const auto shift = [](const Said& said) {
+    const Numbers& P = *said.find(Role::projection);
+    return P[0] != 0 ? P[3] / P[0] : 0;
+  };
+  const auto turned = [](const Said& said) {
+    const Numbers* R = said.find(Role::rectification) ? said.find(Role::rectification) : said.find(Role::rotation);
+    return R && R->size() == 9 && said.find(Role::camera_matrix) ? rotation_from(*R) : Mat3(Mat3::Identity());
+  };
+  const Mat3 left_turned = turned(left), right_turned = turned(right);
+  return {right_turned.transpose() * left_turned, right_turned.transpose() * Vec3(shift(right) - shift(left), 0, 0)};
+}
+
+std::optional<Pose> world_pose(const Said& said) {
+  Pose pose;
+  if (const Numbers* M = said.find(Role::transform)) {
+    const auto& m = *M;
+    pose.rotation << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+    pose.translation = {m[3], m[7], m[11]};
+    return pose;
+  }
+  const Numbers *R = said.find(Role::rotation), *T = said.find(Role::translation);
+  if (!T) return std::nullopt;
+  if (R) pose.rotation = rotation_from(*R);
+  pose.translation = vector_from(*T);
+  return pose;
+}
+
+Pose pose_of(const Calibration& calibration) {
+  const Said &both = calibration.of(Eye::unknown), &left = calibration.of(Eye::left),
+             &right = calibration.of(Eye::right);
+  if (const auto pose = world_pose(both)) {
+    if (!both.find(Role::transform) && !both.find(Role::rotation)) refuse(calibration, "key R is missing");
+    return *pose;
+  }
+  const auto of_right = world_pose(right);
+  if (of_right && !(right.find(Role::projection) && !right.find(Role::translation))) {
+    const auto of_left = world_pose(left);
+    if (!of_left) return *of_right;
+    const Mat3 rotation = of_right->rotation * of_left->rotation.transpose();
+    return {rotation, of_right->translation - rotation * of_left->translation};
+  }
+  if (both_projected(calibration)) return pose_of_projections(left, right);
+  if (both.coefficients.count("baseline"))
+    return {Mat3::Identity(), Vec3(-std::abs(both.coefficient("baseline")), 0, 0)};
+  refuse(calibration, "no pose of the cameras to each other, expected R and T (x_right = R x_left + T)");
+}
+
+// All distances below 0.2 are metres and all above 1 are millimetres, because a baseline is 1-200 mm.
+double to_mm(TranslationUnit unit, double length) {
+  if (unit == TranslationUnit::mm) return 1;
+  if (unit == TranslationUnit::m) return 1000;
+  return length <= kMostBaseline_mm / 1000 ? 1000 : 1;
+}
+
+cv::Size size_of(const Calibration& calibration) {
+  for (const Eye eye : {Eye::unknown, Eye::left}) {
+    const Said& said = calibration.of(eye);
+    const double width = said.coefficient("width"), height = said.coefficient("height");
+    if (width > 0 && height > 0 && width < 1e5 && height < 1e5) return cv::Size(cvRound(width), cvRound(height));
+    if (const Numbers* size = said.find(Role::image_size);
+        size && (*size)[0] > 0 && (*size)[0] < 1e5 && (*size)[1] < 1e5) {
+      const cv::Size stated(cvRound((*size)[0]), cvRound((*size)[1]));
+      return calibration.by_matlab ? cv::Size(stated.height, stated.width) : stated;
+    }
+  }
+  return {};
+}
+
+StereoRig rig_of(const Calibration& calibration, TranslationUnit unit) {
+  StereoRig rig;
+  rig.file = calibration.file;
+  rig.image_size = size_of(calibration);
+  rig.left = camera_of(calibration, Eye::left, rig);
+  rig.right = camera_of(calibration, Eye::right, rig);
+  Pose pose = pose_of(calibration);
+  const bool transposed = calibration.by_matlab && calibration.of(Eye::unknown).find(Role::rotation) &&
+                          calibration.of(Eye::unknown).find(Role::rotation)->size() == 9;
+  const Numbers* K = calibration.of(Eye::left).find(Role::camera_matrix);
+  if (transposed || (K && is_transposed(cv::Matx33d(K->data())))) pose.rotation.transposeInPlace();
+  rig.right_from_left = pose.rotation;
+  rig.right_from_left_mm = pose.translation * to_mm(unit, pose.translation.norm());
+  rig.notes.insert(rig.notes.begin(), "read as " + calibration_kind(calibration.entries));
+  return rig;
+}
+
+/// The same name with one word exchanged for another, in the same capitals; nothing where the word is not in it or no
+/// such file is there.
+std::optional<std::filesystem::path> beside(const std::filesystem::path& file, const std::string& word,
+                                            const std::string& other) {
+  const std::string name = file.filename().string();
+  const size_t at = small(name).rfind(word);
+  if (at == std::string::npos) return std::nullopt;
+  std::string spelled = other;
+  if (std::isupper(static_cast<unsigned char>(name[at]))) spelled[0] = static_cast<char>(std::toupper(spelled[0]));
+  if (word.size() > 1 && std::isupper(static_cast<unsigned char>(name[at + 1])))
+    std::transform(spelled.begin(), spelled.end(), spelled.begin(), [](unsigned char c) { return std::toupper(c); });
+  return file.parent_path() / (name.substr(0, at) + spelled + name.substr(at + word.size()));
+}
+
+std::optional<std::filesystem::path> first_there(const std::filesystem::path& file,
+                                                 const std::vector<std::pair<std::string, std::string>>& exchanges) {
+  std::error_code ignored;
+  for (const auto& [word, other] : exchanges)
+    if (const auto path = beside(file, word, other); path && std::filesystem::exists(*path, ignored)) return path;
+  return std::nullopt;
+}
+
+/// Of what one file lacks, the other one gives.
+void add_what_is_missing(Calibration& calibration, const Calibration& other) {
+  for (size_t eye = 0; eye < calibration.said.size(); ++eye) {
+    calibration.said[eye].values.insert(other.said[eye].values.begin(), other.said[eye].values.end());
+    calibration.said[eye].coefficients.insert(other.said[eye].coefficients.begin(), other.said[eye].coefficients.end());
+  }
+}
+
+/// Calibrations come in pieces: intrinsics.yml and extrinsics.yml, left.yaml and right.yaml, a folder of text files.
+Calibration whole_calibration(const std::filesystem::path& file) {
+  Calibration calibration = calibration_of(file);
+  if (is_bare_numbers(file)) {
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), ignored)) {
+      if (!is_bare_numbers(entry.path()) || entry.path() == file) continue;
+      const auto more = read_calibration_tree(entry.path());
+      calibration.entries.insert(calibration.entries.end(), more.begin(), more.end());
+    }
+    calibration.said = {};
+    sort_in(calibration);
+    return calibration;
+  }
+  const bool has_left = has_camera(calibration.of(Eye::left)), has_right = has_camera(calibration.of(Eye::right));
+  const bool only_camera = !has_left && !has_right && has_camera(calibration.of(Eye::unknown)) &&
+                           !calibration.of(Eye::unknown).coefficients.count("baseline");
+  if (only_camera) {
+    const std::vector<std::pair<std::string, std::string>> names = {
+        {"left", "right"}, {"cam0", "cam1"}, {"camera0", "camera1"}, {"_l", "_r"}, {"_0", "_1"}, {"cam1", "cam2"}};
+    auto right = first_there(file, names);
+    if (!right) right = beside(file, "left", "right");
+    if (!right)
+      throw BadInput(
+          fmt::format("{}: it holds one camera only; of a pair of files the left one is named, expected "
+                      "\"left\" in the name so that the right one can be found beside it",
+                      file.string()));
+    Calibration other = calibration_of(*right);
+    calibration.of(Eye::left) = calibration.of(Eye::unknown);
+    calibration.of(Eye::right) = other.of(Eye::unknown);
+    calibration.of(Eye::unknown) = {};
+    const cv::Size size = size_of(calibration);
+    other.of(Eye::left) = other.of(Eye::unknown);
+    if (size_of(other) != size)
+      throw BadInput(fmt::format("{} is for {}x{} px but {} for {}x{} px, expected the same size", file.string(),
+                                 size.width, size.height, right->string(), size_of(other).width,
+                                 size_of(other).height));
+    if (!both_projected(calibration))
+      throw BadInput(
+          fmt::format("{} and {}: no projection_matrix (P) in both of them, which holds the distance of the "
+                      "cameras",
+                      file.string(), right->string()));
+  } else if ((has_left || has_right) && !has_pose(calibration) && !both_projected(calibration)) {
+    const auto extrinsics =
+        first_there(file, {{"intrinsics", "extrinsics"}, {"intrinsic", "extrinsic"}, {"int", "ext"}});
+    if (!extrinsics)
+      refuse(calibration,
+             "R and T are missing, and no extrinsics file stands beside it (the same name with extrinsics for "
+             "intrinsics); expected all of a stereo calibration, M1 D1 M2 D2 R T");
+    add_what_is_missing(calibration, calibration_of(*extrinsics));
+  } else if (!has_camera(calibration.of(Eye::left)) || !has_camera(calibration.of(Eye::right)) ||
+             !calibration.of(Eye::left).find(Role::camera_matrix)) {
+    if (const auto intrinsics =
+            first_there(file, {{"extrinsics", "intrinsics"}, {"extrinsic", "intrinsic"}, {"ext", "int"}}))
+      if (has_pose(calibration)) {
+        Calibration cameras = calibration_of(*intrinsics);
+        cameras.file = calibration.file;
+        add_what_is_missing(cameras, calibration);
+        return cameras;
+      }
+  }
+  return calibration;
+}
+
+}  // namespace
+
+StereoRig read_rig(const std::filesystem::path& calibration, TranslationUnit unit) {
+  StereoRig rig = rig_of(whole_calibration(calibration), unit);
+  check_rig(rig);
+  return rig;
+}
+
+}  // namespace palpate
