@@ -49,19 +49,6 @@ int value_of(const cv::Vec3b& p) {
   return std::max({p[0], p[1], p[2]});
 }
 
-/// Where the picture is: everything but the black surround that touches the image border.
-cv::Mat find_picture_area(const cv::Mat& bgr) {
-  cv::Mat value, channels[3];
-  cv::split(bgr, channels);
-  cv::max(channels[0], channels[1], value);
-  cv::max(value, channels[2], value);
-  cv::Mat black = value < 8;
-  cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
-  cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
-  cv::floodFill(black, cv::Point(0, 0), 128);
-  return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
-}
-
 /// How much pixels look like metal beside tissue of the given redness; see metalness.
 cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, double least_value) {
   cv::Mat result(bgr.size(), CV_8U);
@@ -361,6 +348,18 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const cv::Mat& sure, c
 }
 
 }  // namespace
+
+cv::Mat find_picture_area(const cv::Mat& bgr) {
+  cv::Mat value, channels[3];
+  cv::split(bgr, channels);
+  cv::max(channels[0], channels[1], value);
+  cv::max(value, channels[2], value);
+  cv::Mat black = value < 8;
+  cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
+  cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+  cv::floodFill(black, cv::Point(0, 0), 128);
+  return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
+}
 
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model) {
   return metalness_beside(bgr(part), model.tissue_redness(part), model.least_value);

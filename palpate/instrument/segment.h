@@ -26,6 +26,9 @@ struct SegmentationModel {
   double least_value = 24;  ///< darker pixels have no colour to judge, grey levels
 };
 
+/// 255 where the picture is: everything but the dark surround that touches the border of the image.
+cv::Mat find_picture_area(const cv::Mat& bgr);
+
 /// Learns what is tissue from a static frame of one eye. `organ_mask` (255 = surely tissue; may be empty) narrows it.
 SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& organ_mask);
 

@@ -38,7 +38,7 @@ TEST(SegmentationNetwork, FindsTheInstrumentWithOneChannelOrSeveralAndInImagesOf
        {"--output sigmoid", "--output logit", "--output classes", "--output sigmoid --size 180 320"}) {
     const std::filesystem::path file = make_network(folder, arguments);
     NEEDS_NETWORK(file);
-    const SegmentationNetwork network(file, 1, image.size());
+    const SegmentationNetwork network(file, {}, image.size());
     const cv::Mat mask = network.mask(image);
     ASSERT_EQ(mask.size(), image.size()) << arguments;
     EXPECT_GT(overlap(mask, truth), 0.93) << arguments;
@@ -51,8 +51,8 @@ TEST(SegmentationNetwork, TellsClassesApart) {
   NEEDS_NETWORK(file);
   const test::DrawnInstrument instrument;
   const cv::Mat image = test::draw_pair({}, instrument, 1).left, truth = test::drawn_mask(instrument);
-  EXPECT_GT(overlap(SegmentationNetwork(file, 0, image.size()).mask(image), ~truth), 0.93);
-  EXPECT_EQ(cv::countNonZero(SegmentationNetwork(file, 2, image.size()).mask(image)), 0);
+  EXPECT_GT(overlap(SegmentationNetwork(file, {.instrument_class = 0}, image.size()).mask(image), ~truth), 0.93);
+  EXPECT_EQ(cv::countNonZero(SegmentationNetwork(file, {.instrument_class = 2}, image.size()).mask(image)), 0);
 }
 
 TEST(SegmentationNetwork, ReplacesTheColours) {
@@ -73,7 +73,7 @@ TEST(SegmentationNetwork, ReplacesTheColours) {
 TEST(SegmentationNetwork, SaysWhatIsWrongWithIt) {
   const TemporaryFolder folder;
   const auto complaint = [&](const std::filesystem::path& file, int instrument_class = 1) {
-    return sentence_of([&] { SegmentationNetwork(file, instrument_class, {640, 360}); });
+    return sentence_of([&] { SegmentationNetwork(file, {.instrument_class = instrument_class}, {640, 360}); });
   };
   EXPECT_THAT(complaint(folder / "missing.onnx"), HasSubstr("missing.onnx: there is no such file"));
   EXPECT_THAT(complaint(folder.write("text.onnx", "no network at all")), HasSubstr("cannot be read"));
