@@ -89,7 +89,7 @@ cv::Mat follow_edges(const cv::Mat& bgr, const cv::Mat& probability) {
   cv::resize(local_functions(guide_of(small), target, radius), functions, part.size(), 0, 0, cv::INTER_LINEAR);
 
   const int near = std::max(1, cvRound(kNear * bgr.cols));
-  const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * near + 1, 2 * near + 1});
+  const cv::Mat kernel = cv::Mat::ones(2 * near + 1, 2 * near + 1, CV_8U);
   cv::Mat inside, outside;
   const cv::Mat sure = coarse > 0.5;
   cv::erode(sure, inside, kernel, {-1, -1}, 1, cv::BORDER_REPLICATE);

@@ -7,11 +7,11 @@
 namespace palpate {
 namespace {
 
-constexpr int kBins = 16;          // of each of brightness and two ratios
-constexpr int kLearntWidth = 320;  // px of the image that is learnt from
-constexpr int kIterations = 4;     // of the cut between instrument and tissue
-constexpr float kFrequent = 3e-4F; // below this frequency a colour says little
-constexpr float kMostEvidence = 3; // of one colour, so that the network can overrule it
+constexpr int kBins = 16;           // of each of brightness and two ratios
+constexpr int kLearntWidth = 320;   // px of the image that is learnt from
+constexpr int kIterations = 4;      // of the cut between instrument and tissue
+constexpr float kFrequent = 3e-4F;  // below this frequency a colour says little
+constexpr float kMostEvidence = 3;  // of one colour, so that the network can overrule it
 
 int bin_of(const cv::Vec3b& p) {
   const float b = p[0] + 8.0F, g = p[1] + 8.0F, r = p[2] + 8.0F;
@@ -71,7 +71,8 @@ ExampleColours::ExampleColours(const cv::Mat& bgr, const cv::Mat& example, const
   cv::resize(example, sure, small.size(), 0, 0, cv::INTER_NEAREST);
   if (cv::countNonZero(sure) == 0) return;
   const cv::Mat instrument = grown(small, sure, probability);
-  const cv::Mat with = frequencies(small, instrument) + kFrequent, without = frequencies(small, ~instrument) + kFrequent;
+  const cv::Mat with = frequencies(small, instrument) + kFrequent,
+                without = frequencies(small, ~instrument) + kFrequent;
   cv::log(with / without, evidence_);
   evidence_ = cv::max(cv::min(evidence_, kMostEvidence), -kMostEvidence);
 }

@@ -8,7 +8,7 @@ namespace palpate {
 namespace {
 
 constexpr double kDoubtOfColours = 0.2;  // what the colour model says is so with this probability not so
-constexpr double kSmallest = 0.001;  // of the picture; what is smaller is a highlight or a clip
+constexpr double kSmallest = 0.001;      // of the picture; what is smaller is a highlight or a clip
 
 /// Without what is too small to be an instrument, and with small holes closed.
 cv::Mat without_specks(const cv::Mat& mask) {

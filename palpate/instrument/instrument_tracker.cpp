@@ -118,8 +118,8 @@ std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_
   return tip;
 }
 
-/// Gives every visible instrument one of each eye's, all at once: near to where it is expected, and the same one in both
-/// eyes.
+/// Gives every visible instrument one of each eye's, all at once: near to where it is expected, and the same one in
+/// both eyes.
 void InstrumentTracker::State::follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const {
   std::array<Assigned, kMostInstruments> best;
   std::array<std::array<std::vector<double>, 2>, kMostInstruments> away_px;  // by tracker, eye, instrument
@@ -261,10 +261,10 @@ void describe(Settings& settings, InstrumentOptions& options) {
                    "the instrument's channel, from 0, where a network has several");
   settings.vector3("mean_rgb", options.network.mean_rgb, {-255, 255},
                    "subtracted from the RGB, 0 to 1, that a network of yours is given");
-  settings.vector3("deviation_rgb", options.network.deviation_rgb, {0, 255, true},
-                   "by which what is left is divided");
+  settings.vector3("deviation_rgb", options.network.deviation_rgb, {0, 255, true}, "by which what is left is divided");
   settings.polygon("example_px", options.example_px,
-                   "an outline of the shaft (or one point on it, [x, y]) in the left image as recorded, at at_frame: from there on its colours count "
+                   "an outline of the shaft (or one point on it, [x, y]) in the left image as recorded, at at_frame: "
+                   "from there on its colours count "
                    "too");
   settings.integer("at_frame", options.at_frame, {0, 1e9}, "the frame of example_px");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");

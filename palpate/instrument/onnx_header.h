@@ -9,7 +9,7 @@ namespace palpate {
 
 /// What an ONNX file says about itself. OpenCV's importer keeps none of it.
 struct OnnxHeader {
-  std::vector<int> input;      ///< dimensions of its only image input; 0 where they are left open; empty: none is stated
+  std::vector<int> input;  ///< dimensions of its only image input; 0 where they are left open; empty: none is stated
   std::string last_operation;  ///< of the graph's last node, "Sigmoid"
 };
 

@@ -21,6 +21,8 @@ constexpr double kLeastContinued_px = 3;  // at half size
 constexpr double kLeastNew = 0.2;         // share of an instrument that was not there in the static frame
 constexpr double kLeftShare = 0.9;        // of a part that stood still, where tissue shows instead
 constexpr double kLit = 1.5;              // times the least value, to tell tissue from shadow
+constexpr double kBlack = 8;              // grey levels of what is around the picture
+constexpr double kBlackShare = 0.05;      // the same, of the picture's brightness, where the surround is lit a little
 constexpr int kDarkest = 12;              // grey levels
 constexpr double kPalest = 0.08;          // redness of tissue that can still be told from metal
 constexpr double kReddest = 0.6;
@@ -41,8 +43,9 @@ double percentile(std::vector<float>& values, double share) {
   return *at;
 }
 
+/// Blue does not count: metal may be olive or brown, tissue is redder than green.
 int redness_of(const cv::Vec3b& p) {
-  return std::max(0, p[2] - std::min(p[0], p[1]) - kColourNoise);
+  return std::max(0, p[2] - p[1] - kColourNoise);
 }
 
 int value_of(const cv::Vec3b& p) {
@@ -64,8 +67,8 @@ cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, doub
     uchar* __restrict to = result.ptr<uchar>(y);
     for (int x = 0; x < columns; ++x) {
       const int b = blue[x], g = green[x], r = red[x];
-      const int least = b < g ? b : g, most = b < g ? g : b, value = r < most ? most : r;
-      const int redness = r - least > kColourNoise ? r - least - kColourNoise : 0;
+      const int most = b < g ? g : b, value = r < most ? most : r;
+      const int redness = r - g > kColourNoise ? r - g - kColourNoise : 0;
       const float of_tissue = 255.0f * static_cast<float>(redness) / static_cast<float>(value * tissue[x] + 1);
       const float bright = per_least * static_cast<float>(value) - 1;
       const float lit = bright < 0 ? 0 : bright > 1 ? 1 : bright;
@@ -354,7 +357,12 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
   cv::split(bgr, channels);
   cv::max(channels[0], channels[1], value);
   cv::max(value, channels[2], value);
-  cv::Mat black = value < 8;
+  std::vector<uchar> sorted;
+  for (int y = 0; y < value.rows; y += 4)
+    for (int x = 0; x < value.cols; x += 4) sorted.push_back(value.at<uchar>(y, x));
+  const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), bright, sorted.end());
+  cv::Mat black = value < std::max(kBlack, kBlackShare * *bright);
   cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
   cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
   cv::floodFill(black, cv::Point(0, 0), 128);

@@ -21,10 +21,10 @@ constexpr int kMultiple = 32;          // of which the sides of such an input ar
 constexpr int kMostClasses = 256;
 
 [[noreturn]] void refuse(const std::filesystem::path& onnx, const std::string& why) {
-  throw BadInput(fmt::format(
-      "instrument.segmentation: {}: {}; expected an ONNX network with one input (1 x 3 x height x width or "
-      "1 x height x width x 3, RGB) and one output (1 x classes x height x width)",
-      onnx.string(), why));
+  throw BadInput(
+      fmt::format("instrument.segmentation: {}: {}; expected an ONNX network with one input (1 x 3 x height x width or "
+                  "1 x height x width x 3, RGB) and one output (1 x classes x height x width)",
+                  onnx.string(), why));
 }
 
 cv::Size open_input_size(cv::Size image) {
@@ -56,8 +56,8 @@ struct SegmentationNetwork::Network {
   std::filesystem::path onnx;
   cv::dnn::Net net;
   NetworkOptions options;
-  cv::Size input;     ///< px
-  cv::Rect content;   ///< where the image lies in the input
+  cv::Size input;    ///< px
+  cv::Rect content;  ///< where the image lies in the input
   bool input_channels_last = false;
   bool output_channels_last = false;
   bool probabilities = false;  ///< or logits, or scores
@@ -91,8 +91,8 @@ void SegmentationNetwork::Network::read_input_shape(const OnnxHeader& header, cv
 cv::Mat SegmentationNetwork::Network::blob(const cv::Mat& bgr) const {
   cv::Mat scaled, boxed;
   cv::resize(bgr, scaled, content.size(), 0, 0, cv::INTER_AREA);
-  cv::copyMakeBorder(scaled, boxed, content.y, input.height - content.br().y, content.x,
-                     input.width - content.br().x, cv::BORDER_CONSTANT);
+  cv::copyMakeBorder(scaled, boxed, content.y, input.height - content.br().y, content.x, input.width - content.br().x,
+                     cv::BORDER_CONSTANT);
   cv::cvtColor(boxed, boxed, cv::COLOR_BGR2RGB);
   boxed.convertTo(boxed, CV_32F, 1.0 / 255);
   const Eigen::Vector3d &mean = options.mean_rgb, &deviation = options.deviation_rgb;
@@ -163,8 +163,8 @@ cv::Mat SegmentationNetwork::probability(const cv::Mat& bgr) const {
   const cv::Mat scores = network.scores(bgr);
   const bool last = network.output_channels_last;
   const int classes = scores.size[last ? 3 : 1];
-  const cv::Rect content = network.content_of(last ? cv::Size(scores.size[2], scores.size[1])
-                                                   : cv::Size(scores.size[3], scores.size[2]));
+  const cv::Rect content =
+      network.content_of(last ? cv::Size(scores.size[2], scores.size[1]) : cv::Size(scores.size[3], scores.size[2]));
   if (classes == 1) {
     const cv::Mat score = channel_of(scores, 0, last)(content);
     // Logits of a whole picture do not all lie between 0 and 1.

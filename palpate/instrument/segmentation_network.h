@@ -10,8 +10,8 @@ namespace palpate {
 
 /// How a network's input is made and its output read.
 struct NetworkOptions {
-  int instrument_class = 1;                                  ///< its channel, from 0, where there are several
-  Eigen::Vector3d mean_rgb = Eigen::Vector3d::Zero();        ///< subtracted from RGB from 0 to 1
+  int instrument_class = 1;                                 ///< its channel, from 0, where there are several
+  Eigen::Vector3d mean_rgb = Eigen::Vector3d::Zero();       ///< subtracted from RGB from 0 to 1
   Eigen::Vector3d deviation_rgb = Eigen::Vector3d::Ones();  ///< what is left is divided by it
 };
 
