@@ -34,14 +34,15 @@ struct Picture {
 };
 
 constexpr int kLeastPixels = 60;
-constexpr double kApartWidths = 2;    // between the places where two shafts enter
-constexpr double kShaftShare = 0.5;   // of the full width that a slice of the shaft has
-constexpr double kSleeveShare = 0.8;  // the same where a thin rod comes out of a sleeve
-constexpr double kSolid = 0.85;       // share of a slice of the shaft that belongs to the mask
-constexpr double kStraight = 0.14;    // deviation of a shaft's edges from straight lines, in its widths
-constexpr double kGapWidths = 3;      // between the border and what is seen of an instrument whose shaft is too dark
-constexpr double kGapLength = 1.8;    // of such a part, in its widths
-constexpr double kRearEnd = 0.06;     // of its length
+constexpr double kApartWidths = 2;      // between the places where two shafts enter
+constexpr double kShaftShare = 0.5;     // of the full width that a slice of the shaft has
+constexpr double kSleeveShare = 0.8;    // the same where a thin rod comes out of a sleeve
+constexpr double kSolid = 0.85;         // share of a slice of the shaft that belongs to the mask
+constexpr double kStraight = 0.14;      // deviation of a shaft's edges from straight lines, in its widths
+constexpr double kVeryStraight = 0.09;  // the same of a mask that nothing but colours has made
+constexpr double kGapWidths = 3;        // between the border and what is seen of an instrument whose shaft is too dark
+constexpr double kGapLength = 1.8;      // of such a part, in its widths
+constexpr double kRearEnd = 0.06;       // of its length
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -153,10 +154,10 @@ Shaft fit_shaft(const std::vector<Slice>& slices, double least_share) {
   return shaft;
 }
 
-bool looks_like_an_instrument(const Shaft& shaft, double length) {
+bool looks_like_an_instrument(const Shaft& shaft, double length, double straight) {
   const double width = shaft.width;
   if (width < 3 || shaft.slices < 0.6 * width || length < 1.3 * width) return false;
-  const double straightness = std::max(1.5, kStraight * width);
+  const double straightness = std::max(1.5, straight * width);
   return shaft.low.deviation < straightness && shaft.high.deviation < straightness &&
          std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.6;
 }
@@ -259,7 +260,7 @@ std::vector<cv::Point> rear_end(const std::vector<cv::Point>& pixels, const cv::
 }
 
 std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border,
-                                         const cv::Point& origin, const Picture& picture) {
+                                         const cv::Point& origin, const Picture& picture, double straight) {
   cv::Point2d entry(0, 0);
   std::vector<cv::Point> entering;
   for (const cv::Point& p : pixels)
@@ -291,11 +292,11 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest)) {
+  if (!looks_like_an_instrument(shaft, farthest, straight)) {
     shaft = fit_shaft(slices, kSleeveShare);
     if (!has_rod(slices, shaft)) return {};
   }
-  if (!looks_like_an_instrument(shaft, farthest) || at_two_places(entering, shaft.width)) return {};
+  if (!looks_like_an_instrument(shaft, farthest, straight) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);
   ImageTip tip;
@@ -305,10 +306,8 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   return tip;
 }
 
-}  // namespace
-
-std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
-                                              size_t most) {
+std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t most,
+                                            double straight) {
   std::vector<ImageInstrument> found;
   const cv::Rect box = cv::boundingRect(instrument_mask);
   if (box.area() < kLeastPixels) return found;
@@ -327,7 +326,7 @@ std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, co
     cv::findNonZero(part, pixels);
     const bool from_image_border = touches(pixels, border) || picture_area.empty();
     if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box), box.tl(),
-                                    {instrument_mask.size(), picture_area})) {
+                                    {instrument_mask.size(), picture_area}, straight)) {
       tip->tip_px += cv::Point2d(box.tl());
       found.push_back({*tip, box, part});
     }
@@ -335,8 +334,15 @@ std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, co
   return found;
 }
 
+}  // namespace
+
+std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
+                                              size_t most) {
+  return instruments_in(instrument_mask, picture_area, most, kStraight);
+}
+
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
-  const std::vector<ImageInstrument> found = find_instruments(instrument_mask, picture_area, 1);
+  const std::vector<ImageInstrument> found = instruments_in(instrument_mask, picture_area, 1, kVeryStraight);
   if (found.empty()) return {};
   return found[0].tip;
 }

@@ -11,6 +11,7 @@ namespace palpate {
 namespace {
 
 constexpr int kColourNoise = 2;       // grey levels by which a grey pixel may look red
+constexpr int kOliveQuarters = 2;     // of the green over the blue that counts as red
 constexpr int kUnchanged = 24;        // grey levels between two pictures of the same still highlight
 constexpr int kNearSaturation = 200;  // both brighter than this: a highlight that flickers
 constexpr int kTissueMoves = 7;       // px at half size, twice the way and one
@@ -43,9 +44,14 @@ double percentile(std::vector<float>& values, double share) {
   return *at;
 }
 
-/// Blue does not count: metal may be olive or brown, tissue is redder than green.
+/// Red over green, and only a little of green over blue: metal may be olive or brown.
+int redness_of(int b, int g, int r) {
+  const int redness = r - g + (b < g ? ((g - b) * kOliveQuarters) / 4 : 0) - kColourNoise;
+  return redness > 0 ? redness : 0;
+}
+
 int redness_of(const cv::Vec3b& p) {
-  return std::max(0, p[2] - p[1] - kColourNoise);
+  return redness_of(p[0], p[1], p[2]);
 }
 
 int value_of(const cv::Vec3b& p) {
@@ -68,7 +74,7 @@ cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, doub
     for (int x = 0; x < columns; ++x) {
       const int b = blue[x], g = green[x], r = red[x];
       const int most = b < g ? g : b, value = r < most ? most : r;
-      const int redness = r - g > kColourNoise ? r - g - kColourNoise : 0;
+      const int redness = redness_of(b, g, r);
       const float of_tissue = 255.0f * static_cast<float>(redness) / static_cast<float>(value * tissue[x] + 1);
       const float bright = per_least * static_cast<float>(value) - 1;
       const float lit = bright < 0 ? 0 : bright > 1 ? 1 : bright;
@@ -202,9 +208,13 @@ cv::Mat instrument_blobs(const cv::Mat& grey, const cv::Mat& half_picture_area) 
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   const double least_area = 0.0015 * mask.rows * mask.cols;
-  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U), inside;
+  cv::erode(half_picture_area, inside, cv::Mat::ones(5, 5, CV_8U), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
+  const auto at_border = [&inside](const cv::Point& p) { return !inside.at<uchar>(p); };
   for (size_t i = 0; i < outlines.size(); ++i) {
     if (cv::contourArea(outlines[i]) < least_area) continue;
+    // What only comes near it is, by its colours alone, as likely a highlight.
+    if (std::none_of(outlines[i].begin(), outlines[i].end(), at_border)) continue;
     cv::Mat blob = cv::Mat::zeros(mask.size(), CV_8U);
     cv::drawContours(blob, outlines, static_cast<int>(i), 255, cv::FILLED);
     if (find_tip(blob, half_picture_area)) result |= blob;

@@ -41,8 +41,8 @@ cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model);
 void forget_what_left(const cv::Mat& bgr, SegmentationModel& model);
 
 /// How much each pixel of a part of the image looks like metal, 8-bit: 255 = without any redness
-/// (r - g) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to
-/// tell.
+/// (r - g + (g - b) / 2) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark
+/// to tell.
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model);
 
 }  // namespace palpate

@@ -16,8 +16,8 @@
 namespace palpate {
 namespace {
 
-constexpr double kPixels = 320 * 192;  // of an input whose size is open
-constexpr int kMultiple = 32;          // of which the sides of such an input are, which most networks ask for
+constexpr double kPixels = 320 * 192;  // of our own network's input
+constexpr int kMultiple = 32;          // of which the sides of an input of open size are: most networks ask for it
 constexpr int kMostClasses = 256;
 
 [[noreturn]] void refuse(const std::filesystem::path& onnx, const std::string& why) {
@@ -27,7 +27,7 @@ constexpr int kMostClasses = 256;
                   onnx.string(), why));
 }
 
-cv::Size open_input_size(cv::Size image) {
+cv::Size learned_input_size(cv::Size image) {
   const double scale = std::sqrt(kPixels / image.area());
   const auto side = [scale](int pixels) { return std::max(1, cvRound(scale * pixels / kMultiple)) * kMultiple; };
   return {side(image.width), side(image.height)};
@@ -70,8 +70,9 @@ struct SegmentationNetwork::Network {
 };
 
 void SegmentationNetwork::Network::read_input_shape(const OnnxHeader& header, cv::Size image) {
-  input = open_input_size(image);
-  content = cv::Rect({}, input);
+  const auto padded = [](int pixels) { return (pixels + kMultiple - 1) / kMultiple * kMultiple; };
+  input = {padded(image.width), padded(image.height)};
+  content = cv::Rect({(input.width - image.width) / 2, (input.height - image.height) / 2}, image);
   probabilities = header.last_operation == "Sigmoid" || header.last_operation == "HardSigmoid" ||
                   header.last_operation == "Softmax";
   const std::vector<int>& shape = header.input;
@@ -150,7 +151,7 @@ SegmentationNetwork::SegmentationNetwork(cv::Size image) : network_(std::make_un
   const std::string_view weights = learned_weights();
   network_->onnx = "learned";
   network_->net = cv::dnn::readNetFromONNX(weights.data(), weights.size());
-  network_->input = open_input_size(image);
+  network_->input = learned_input_size(image);
   network_->content = cv::Rect({}, network_->input);
 }
 

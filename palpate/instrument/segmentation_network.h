@@ -19,7 +19,7 @@ struct NetworkOptions {
 /// 1 x height x width x 3, float, RGB; and one output, 1 x classes x height x width or 1 x height x width x classes, of
 /// any size: with one channel the instrument's probability or its logit, with several channels scores (logits or
 /// probabilities) of which the greatest wins. Images are scaled to the input's size and letter-boxed; where the file
-/// leaves the size open, they are scaled to about 320 x 192 px.
+/// leaves the size open, they are padded to multiples of 32 px.
 class SegmentationNetwork {
  public:
   /// The user's. Throws BadInput: the file cannot be read, OpenCV cannot run it (with the layer), several outputs, an

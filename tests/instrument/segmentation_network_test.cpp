@@ -115,7 +115,7 @@ TEST(SegmentationNetwork, SaysWhatIsWrongWithIt) {
   EXPECT_THAT(complaint(classes, 3), AllOf(HasSubstr("instrument.class is 3"), HasSubstr("0 to 2")));
   EXPECT_THAT(complaint(make_network(folder, "--flaw unknown-layer --output logit")), HasSubstr("Bernoulli"));
   EXPECT_THAT(complaint(make_network(folder, "--flaw two-outputs --output logit")), HasSubstr("2 outputs"));
-  EXPECT_THAT(complaint(make_network(folder, "--flaw flat --output logit")), HasSubstr("the output is 1 x 230400"));
+  EXPECT_THAT(complaint(make_network(folder, "--flaw flat --output logit")), HasSubstr("the output is 1 x 245760"));
 }
 
 }  // namespace
