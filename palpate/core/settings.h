@@ -57,6 +57,8 @@ class Settings {
   /// [[..], [..], [..]], row by row.
   void matrix3(const std::string& key, Eigen::Matrix3d& field, const std::string& doc);
   void pixel(const std::string& key, cv::Point2d& field, const std::string& doc);
+  /// [x, y], or [[x, y], ...] with at least three corners.
+  void points(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc);
   /// [[x, y], ...], at least three corners.
   void polygon(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc);
 

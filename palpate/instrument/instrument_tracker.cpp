@@ -262,10 +262,10 @@ void describe(Settings& settings, InstrumentOptions& options) {
   settings.vector3("mean_rgb", options.network.mean_rgb, {-255, 255},
                    "subtracted from the RGB, 0 to 1, that a network of yours is given");
   settings.vector3("deviation_rgb", options.network.deviation_rgb, {0, 255, true}, "by which what is left is divided");
-  settings.polygon("example_px", options.example_px,
-                   "an outline of the shaft (or one point on it, [x, y]) in the left image as recorded, at at_frame: "
-                   "from there on its colours count "
-                   "too");
+  settings.points("example_px", options.example_px,
+                  "an outline of the shaft (or one point on it, [x, y]) in the left image as recorded, at at_frame: "
+                  "from there on its colours count "
+                  "too");
   settings.integer("at_frame", options.at_frame, {0, 1e9}, "the frame of example_px");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
