@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
+#include "app/check_pictures.h"
+#include "app/output_folder.h"
 #include "app/recording_check.h"
 #include "app/run.h"
 #include "app/track_check.h"
@@ -51,24 +53,30 @@ nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& buil
 
 void add_check(CLI::App& app) {
   struct Arguments {
-    std::filesystem::path scene;
+    std::filesystem::path scene, folder;
     bool json = false;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb =
       app.add_subcommand("check",
                          "Says what is wrong with an input before anything runs, and how a tip track lies to the "
-                         "video; writes nothing");
+                         "video; writes nothing without -o");
   verb->add_option("scene", arguments->scene, "scene.yaml")->required()->type_name("SCENE");
+  verb->add_option("-o,--output", arguments->folder,
+                   "folder for instruments.png (masks and tips of ten frames) and rectified.png (row lines)")
+      ->type_name("FOLDER");
   verb->add_flag("--json", arguments->json, "answer as JSON");
-  verb->footer("Example: palpate check scene.yaml");
+  verb->footer("Example: palpate check scene.yaml -o check");
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
+    if (!arguments->folder.empty()) require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
     std::optional<TrackCheck> track;
     if (!scene_file.scene.instrument.track.empty()) track = check_track(scene_file, built, arguments->json);
+    if (!arguments->folder.empty()) write_check_pictures(scene_file, built, arguments->folder, arguments->json);
     if (arguments->json) {
       nlohmann::ordered_json json = json_of(scene_file, built);
+      if (!arguments->folder.empty()) json["folder"] = arguments->folder.string();
       if (track) json["track"] = to_json(*track);
       fmt::print("{}", json_success(json));
       return;
@@ -77,6 +85,7 @@ void add_check(CLI::App& app) {
                arguments->scene.string(), built.map.cloud.size(), 100 * built.map.report.coverage,
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size());
     if (track) fmt::print("{}", to_text(*track));
+    if (!arguments->folder.empty()) fmt::print("written to {}\n", arguments->folder.string());
   });
 }
 

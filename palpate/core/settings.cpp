@@ -299,6 +299,22 @@ void Settings::rectangle(const std::string& key, cv::Rect2d& field, const std::s
   entries_.push_back(std::move(entry));
 }
 
+void Settings::points(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc) {
+  polygon(key, field, doc);
+  Entry& entry = *entries_.back();
+  entry.range = "[x, y] or [[x, y], ...]";
+  entry.read = [&field, of_polygon = entry.read](const YAML::Node& node, const SettingsContext& context,
+                                                 const std::string& place, const std::string& prefix) {
+    if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar()) return of_polygon(node, context, place, prefix);
+    const std::vector<double> values = numbers_of(node, 2, place, {});
+    field = {{values[0], values[1]}};
+  };
+  entry.write = [&field] {
+    if (field.size() != 1) return field.empty() ? std::string() : flow(field);
+    return flow(std::vector<double>{field[0].x, field[0].y});
+  };
+}
+
 void Settings::polygon(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;

@@ -59,6 +59,8 @@ class Settings {
   void pixel(const std::string& key, cv::Point2d& field, const std::string& doc);
   /// [x, y, width, height]
   void rectangle(const std::string& key, cv::Rect2d& field, const std::string& doc);
+  /// [x, y], or [[x, y], ...] with at least three corners.
+  void points(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc);
   /// [[x, y], ...], at least three corners.
   void polygon(const std::string& key, std::vector<cv::Point2d>& field, const std::string& doc);
 

@@ -23,11 +23,26 @@ struct EdgeLine {
   double deviation = 0;  ///< robust, of the edge points that were used, px
 };
 
+/// The part of the image that shows anything.
+struct Picture {
+  cv::Size size;
+  const cv::Mat& area;  ///< 255 inside; may be empty
+
+  bool contains(const cv::Point& p) const {
+    return cv::Rect({}, size).contains(p) && (area.empty() || area.at<uchar>(p) != 0);
+  }
+};
+
 constexpr int kLeastPixels = 60;
-constexpr double kApartWidths = 2;    // between the places where two shafts enter
-constexpr double kShaftShare = 0.5;   // of the full width that a slice of the shaft has
-constexpr double kSleeveShare = 0.8;  // the same where a thin rod comes out of a sleeve
-constexpr double kSolid = 0.85;       // share of a slice of the shaft that belongs to the mask
+constexpr double kApartWidths = 2;      // between the places where two shafts enter
+constexpr double kShaftShare = 0.5;     // of the full width that a slice of the shaft has
+constexpr double kSleeveShare = 0.8;    // the same where a thin rod comes out of a sleeve
+constexpr double kSolid = 0.85;         // share of a slice of the shaft that belongs to the mask
+constexpr double kStraight = 0.14;      // deviation of a shaft's edges from straight lines, in its widths
+constexpr double kVeryStraight = 0.09;  // the same of a mask that nothing but colours has made
+constexpr double kGapWidths = 3;        // between the border and what is seen of an instrument whose shaft is too dark
+constexpr double kGapLength = 1.8;      // of such a part, in its widths
+constexpr double kRearEnd = 0.06;       // of its length
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -139,10 +154,10 @@ Shaft fit_shaft(const std::vector<Slice>& slices, double least_share) {
   return shaft;
 }
 
-bool looks_like_an_instrument(const Shaft& shaft, double length) {
+bool looks_like_an_instrument(const Shaft& shaft, double length, double straight) {
   const double width = shaft.width;
   if (width < 3 || shaft.slices < 0.6 * width || length < 1.3 * width) return false;
-  const double straightness = std::max(1.5, 0.09 * width);
+  const double straightness = std::max(1.5, straight * width);
   return shaft.low.deviation < straightness && shaft.high.deviation < straightness &&
          std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.6;
 }
@@ -206,15 +221,53 @@ bool at_two_places(const std::vector<cv::Point>& entering, double width) {
   return false;
 }
 
-std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border) {
+/// How far the border of the picture is from a pixel in a direction.
+double way_to_border_px(const Picture& picture, cv::Point2d from, const cv::Point2d& direction) {
+  constexpr double kStep_px = 3;
+  double way = 0;
+  while (picture.contains(from + way * direction)) way += kStep_px;
+  return way;
+}
+
+/// The pixels at that end of a part from which the border of the picture is nearest, if it is near enough for the rest
+/// of the shaft to be there unseen.
+std::vector<cv::Point> rear_end(const std::vector<cv::Point>& pixels, const cv::Point& origin, const Picture& picture) {
+  cv::Matx22d spread = cv::Matx22d::zeros();
+  cv::Point2d centre(0, 0);
+  for (const cv::Point& p : pixels) centre += cv::Point2d(p) * (1.0 / static_cast<double>(pixels.size()));
+  for (const cv::Point& p : pixels) {
+    const cv::Point2d d = cv::Point2d(p) - centre;
+    spread += cv::Matx22d(d.x * d.x, d.x * d.y, d.x * d.y, d.y * d.y);
+  }
+  const double angle = 0.5 * std::atan2(2 * spread(0, 1), spread(0, 0) - spread(1, 1));
+  const cv::Point2d axis(std::cos(angle), std::sin(angle));
+  double least = 1e9, most = -1e9;
+  for (const cv::Point& p : pixels) {
+    const double s = (cv::Point2d(p) - centre).dot(axis);
+    least = std::min(least, s), most = std::max(most, s);
+  }
+  const double length = most - least, width = static_cast<double>(pixels.size()) / std::max(1.0, length);
+  const cv::Point2d from = centre + cv::Point2d(origin);
+  const double behind = way_to_border_px(picture, from + least * axis, -axis);
+  const double ahead = way_to_border_px(picture, from + most * axis, axis);
+  if (length < kGapLength * width || std::min(behind, ahead) > kGapWidths * width) return {};
+  std::vector<cv::Point> end;
+  for (const cv::Point& p : pixels) {
+    const double s = (cv::Point2d(p) - centre).dot(axis), from_end = behind <= ahead ? s - least : most - s;
+    if (from_end <= kRearEnd * length) end.push_back(p);
+  }
+  return end;
+}
+
+std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border,
+                                         const cv::Point& origin, const Picture& picture, double straight) {
   cv::Point2d entry(0, 0);
   std::vector<cv::Point> entering;
-  for (const cv::Point& p : pixels) {
-    if (!border.at<uchar>(p)) continue;
-    entry += cv::Point2d(p);
-    entering.push_back(p);
-  }
+  for (const cv::Point& p : pixels)
+    if (border.at<uchar>(p)) entering.push_back(p);
+  if (entering.empty()) entering = rear_end(pixels, origin, picture);
   if (entering.empty()) return {};
+  for (const cv::Point& p : entering) entry += cv::Point2d(p);
   entry *= 1.0 / static_cast<double>(entering.size());
 
   cv::Point2d axis(0, 0);
@@ -239,11 +292,11 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest)) {
+  if (!looks_like_an_instrument(shaft, farthest, straight)) {
     shaft = fit_shaft(slices, kSleeveShare);
     if (!has_rod(slices, shaft)) return {};
   }
-  if (!looks_like_an_instrument(shaft, farthest) || at_two_places(entering, shaft.width)) return {};
+  if (!looks_like_an_instrument(shaft, farthest, straight) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);
   ImageTip tip;
@@ -253,10 +306,8 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   return tip;
 }
 
-}  // namespace
-
-std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
-                                              size_t most) {
+std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t most,
+                                            double straight) {
   std::vector<ImageInstrument> found;
   const cv::Rect box = cv::boundingRect(instrument_mask);
   if (box.area() < kLeastPixels) return found;
@@ -274,7 +325,8 @@ std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, co
     const cv::Mat part = labels == label;
     cv::findNonZero(part, pixels);
     const bool from_image_border = touches(pixels, border) || picture_area.empty();
-    if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box))) {
+    if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box), box.tl(),
+                                    {instrument_mask.size(), picture_area}, straight)) {
       tip->tip_px += cv::Point2d(box.tl());
       found.push_back({*tip, box, part});
     }
@@ -282,8 +334,15 @@ std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, co
   return found;
 }
 
+}  // namespace
+
+std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
+                                              size_t most) {
+  return instruments_in(instrument_mask, picture_area, most, kStraight);
+}
+
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
-  const std::vector<ImageInstrument> found = find_instruments(instrument_mask, picture_area, 1);
+  const std::vector<ImageInstrument> found = instruments_in(instrument_mask, picture_area, 1, kVeryStraight);
   if (found.empty()) return {};
   return found[0].tip;
 }

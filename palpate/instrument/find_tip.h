@@ -22,8 +22,9 @@ struct ImageInstrument {
 };
 
 /// The instruments of a mask, each a part of it that hangs together, enters from the border of the picture at one place
-/// and looks like a shaft with a free end; the largest first. Two that touch each other enter at two places and are
-/// none. `picture_area` (255 inside, may be empty) says where the picture ends when it does not fill the image.
+/// (or begins near it: a dark shaft may not be seen) and looks like a shaft with a free end; the largest first. Two
+/// that touch each other enter at two places and are none. `picture_area` (255 inside, may be empty) says where the
+/// picture ends when it does not fill the image.
 std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area = {},
                                               size_t most = 4);
 

@@ -5,11 +5,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include "palpate/core/errors.h"
 #include "palpate/instrument/find_tip.h"
-#include "palpate/instrument/segment.h"
-#include "palpate/instrument/segmentation_network.h"
+#include "palpate/instrument/instrument_finder.h"
 #include "palpate/instrument/tip_tracker.h"
 
 namespace palpate {
@@ -21,14 +22,41 @@ constexpr int kBeforeASecondIsBelieved = 3;
 constexpr double kSameDirection = 0.5;  // cosine between shafts of one instrument that left and came back
 constexpr double kFarthest_px = 120;    // between where a tip is expected and where it is, if its shaft has turned
 constexpr double kTurnedShaft = 0.7;    // cosine
+constexpr double kNotSeen_px = 1000;    // what it costs that an eye does not show an instrument
+constexpr double kNotOneTip_px = 600;   // and that the eyes show what cannot be one tip
+constexpr double kNever_px = 1e6;
 constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
 
 /// One eye in one frame.
 struct SeenByEye {
-  cv::Mat mask;
+  FoundInstruments found;
   std::vector<ImageInstrument> instruments;
   std::array<int, kMostInstruments> of_tracker;  ///< which of `instruments`, or -1
 };
+
+/// An outline as it is; around a point, a small square.
+std::vector<cv::Point2d> around(const std::vector<cv::Point2d>& example_px) {
+  if (example_px.size() >= 3) return example_px;
+  constexpr double kAround_px = 8;
+  const cv::Point2d p = example_px.front(), x(kAround_px, 0), y(0, kAround_px);
+  return {p - x - y, p + x - y, p + x + y, p - x + y};
+}
+
+/// Which instrument of each eye, or -1.
+using Assigned = std::array<int, 2>;
+
+/// Between where a tip is expected and where one is.
+double away_from(const ImageTip& expected, const ImageTip& tip) {
+  const double distance_px = cv::norm(tip.tip_px - expected.tip_px), cosine = tip.axis.dot(expected.axis);
+  if (distance_px > kFarthest_px && cosine < kTurnedShaft) return kNever_px;
+  return distance_px + kFarthest_px * (1 - cosine);
+}
+
+/// How badly the tips of two eyes go together, though they can be one.
+double misfit(const ImageTip& left, const ImageTip& right) {
+  const double rows = std::abs(left.tip_px.y - right.tip_px.y) / (4 + 0.15 * left.width_px);
+  return rows + 4 * (1 - left.axis.dot(right.axis)) + std::abs(std::log(left.width_px / right.width_px));
+}
 
 /// Share of the end of a shaft, where it is expected, that lies on a mask whose corner is at `origin`.
 double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& expected) {
@@ -45,9 +73,10 @@ double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& ex
 
 struct InstrumentTracker::State {
   Rectification rectification;
+  cv::Mat example;  ///< 255 in the rectified left image of the example's frame; may be empty
+  int example_frame = 0;
   RowOffset rows;
-  std::array<SegmentationModel, 2> models;
-  std::vector<SegmentationNetwork> networks;  ///< one for each eye, or none
+  std::vector<InstrumentFinder> finders;  ///< one for each eye
   std::vector<TipTrack> tracks;
   double time_offset_s = 0;
   std::vector<TipTracker> trackers;
@@ -78,9 +107,8 @@ std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& tr
 SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) {
   SeenByEye seen;
   seen.of_tracker.fill(-1);
-  if (networks.empty()) forget_what_left(bgr, models[eye]);
-  seen.mask = networks.empty() ? segment_instrument(bgr, models[eye]) : networks[eye].mask(bgr);
-  seen.instruments = find_instruments(seen.mask, models[eye].picture_area);
+  seen.found = finders[eye].find(bgr);
+  seen.instruments = find_instruments(seen.found.mask, finders[eye].picture_area());
   return seen;
 }
 
@@ -90,32 +118,42 @@ std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_
   return tip;
 }
 
-/// Gives every visible instrument the one of each eye that lies nearest to where it is expected.
+/// Gives every visible instrument one of each eye's, all at once: near to where it is expected, and the same one in
+/// both eyes.
 void InstrumentTracker::State::follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const {
-  for (size_t eye = 0; eye < 2; ++eye) {
-    struct Pair {
-      double distance_px;
-      size_t tracker;
-      int instrument;
-    };
-    std::vector<Pair> pairs;
-    for (size_t t = 0; t < kMostInstruments; ++t) {
-      const auto tip = expected(t, eye, seconds);
-      if (!tip || !trackers[t].visible()) continue;
-      for (size_t i = 0; i < seen[eye].instruments.size(); ++i) {
-        const ImageTip& candidate = seen[eye].instruments[i].tip;
-        const double distance_px = cv::norm(candidate.tip_px - tip->tip_px), cosine = candidate.axis.dot(tip->axis);
-        if (distance_px > kFarthest_px && cosine < kTurnedShaft) continue;
-        pairs.push_back({distance_px + kFarthest_px * (1 - cosine), t, static_cast<int>(i)});
-      }
+  std::array<Assigned, kMostInstruments> best;
+  std::array<std::array<std::vector<double>, 2>, kMostInstruments> away_px;  // by tracker, eye, instrument
+  for (size_t t = 0; t < kMostInstruments; ++t)
+    for (size_t eye = 0; eye < 2; ++eye) {
+      const auto tip = trackers[t].visible() ? expected(t, eye, seconds) : std::nullopt;
+      for (const ImageInstrument& candidate : seen[eye].instruments)
+        away_px[t][eye].push_back(tip ? away_from(*tip, candidate.tip) : kNever_px);
     }
-    std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.distance_px < b.distance_px; });
-    auto& of_tracker = seen[eye].of_tracker;
-    for (const Pair& pair : pairs)
-      if (of_tracker[pair.tracker] < 0 &&
-          std::find(of_tracker.begin(), of_tracker.end(), pair.instrument) == of_tracker.end())
-        of_tracker[pair.tracker] = pair.instrument;
-  }
+  const auto cost_px = [&](size_t t, const Assigned& given) {
+    double cost = 0;
+    for (size_t eye = 0; eye < 2; ++eye)
+      cost += given[eye] < 0 ? kNotSeen_px : away_px[t][eye][static_cast<size_t>(given[eye])];
+    if (given[0] >= 0 && given[1] >= 0 &&
+        !can_be_one_tip(seen[0].instruments[static_cast<size_t>(given[0])].tip,
+                        seen[1].instruments[static_cast<size_t>(given[1])].tip))
+      cost += kNotOneTip_px;
+    return cost;
+  };
+  const auto choices = [&](size_t eye) { return static_cast<int>(seen[eye].instruments.size()); };
+  const auto differ = [](int a, int b) { return a < 0 || a != b; };
+  double least = std::numeric_limits<double>::max();
+  static_assert(kMostInstruments == 2);
+  Assigned first, second;
+  for (first[0] = -1; first[0] < choices(0); ++first[0])
+    for (first[1] = -1; first[1] < choices(1); ++first[1])
+      for (second[0] = -1; second[0] < choices(0); ++second[0])
+        for (second[1] = -1; second[1] < choices(1); ++second[1]) {
+          if (!differ(first[0], second[0]) || !differ(first[1], second[1])) continue;
+          const double cost = cost_px(0, first) + cost_px(1, second);
+          if (cost < least) least = cost, best = {first, second};
+        }
+  for (size_t t = 0; t < kMostInstruments; ++t)
+    for (size_t eye = 0; eye < 2; ++eye) seen[eye].of_tracker[t] = best[t][eye];
 }
 
 /// Which instruments touch another one in either image, so that the outline of their common mask is neither's. They
@@ -130,7 +168,7 @@ std::array<bool, kMostInstruments> InstrumentTracker::State::part_touching(std::
     for (size_t t = 0; t < kMostInstruments; ++t) {
       if (given[t] >= 0) continue;
       const auto tip = expected(t, eye, seconds);
-      if (!tip || share_on(seen[eye].mask, {0, 0}, *tip) < kTouchingShare) continue;
+      if (!tip || share_on(seen[eye].found.mask, {0, 0}, *tip) < kTouchingShare) continue;
       here[t] = true;
       for (size_t other = 0; other < kMostInstruments; ++other) {
         if (given[other] < 0) continue;
@@ -171,31 +209,38 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
   };
   bool beside_another = std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
   bool asks = false;
-  for (size_t l = 0; l < seen[0].instruments.size(); ++l)
+  for (size_t l = 0; l < seen[0].instruments.size(); ++l) {
+    if (is_given(seen[0], l)) continue;
+    const ImageTip& left = seen[0].instruments[l].tip;
+    std::optional<size_t> partner;
+    double least = std::numeric_limits<double>::max();
     for (size_t r = 0; r < seen[1].instruments.size(); ++r) {
-      const ImageTip& left = seen[0].instruments[l].tip;
-      if (is_given(seen[0], l) || is_given(seen[1], r) || !can_be_one_tip(left, seen[1].instruments[r].tip)) continue;
-      const auto entry = entry_for(left, seen[0]);
-      if (!entry) return;
-      if (beside_another && !keeps_its_entry(*entry)) {
-        asks = true;
-        if (second_seen + 1 < kBeforeASecondIsBelieved) continue;
-      }
-      if (!keeps_its_entry(*entry)) {
-        trackers[*entry] = TipTracker(rectification, rows);
-        frames_seen[*entry] = 0;
-      }
-      seen[0].of_tracker[*entry] = static_cast<int>(l);
-      seen[1].of_tracker[*entry] = static_cast<int>(r);
-      beside_another = true;
+      const ImageTip& right = seen[1].instruments[r].tip;
+      if (is_given(seen[1], r) || !can_be_one_tip(left, right) || misfit(left, right) >= least) continue;
+      least = misfit(left, right), partner = r;
     }
+    if (!partner) continue;
+    const auto entry = entry_for(left, seen[0]);
+    if (!entry) return;
+    if (beside_another && !keeps_its_entry(*entry)) {
+      asks = true;
+      if (second_seen + 1 < kBeforeASecondIsBelieved) continue;
+    }
+    if (!keeps_its_entry(*entry)) {
+      trackers[*entry] = TipTracker(rectification, rows);
+      frames_seen[*entry] = 0;
+    }
+    seen[0].of_tracker[*entry] = static_cast<int>(l);
+    seen[1].of_tracker[*entry] = static_cast<int>(*partner);
+    beside_another = true;
+  }
   second_seen = asks ? second_seen + 1 : 0;
 }
 
 EyeView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye,
                                        double seconds) const {
   EyeView result;
-  result.mask = seen.mask;
+  result.mask = seen.found.mask;
   for (size_t other = 0; other < kMostInstruments; ++other) {
     if (other == tracker || seen.of_tracker[other] < 0) continue;
     const ImageInstrument& its = seen.instruments[static_cast<size_t>(seen.of_tracker[other])];
@@ -204,17 +249,24 @@ EyeView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByEye& seen
   }
   if (seen.of_tracker[tracker] >= 0) result.tip = seen.instruments[static_cast<size_t>(seen.of_tracker[tracker])].tip;
   const std::optional<ImageTip> look_at = result.tip ? result.tip : expected(tracker, eye, seconds);
-  if (look_at && networks.empty()) result.layers = make_layers(bgr, region_around(*look_at), models[eye]);
-  if (look_at && !networks.empty()) result.layers = make_layers(bgr, region_around(*look_at), seen.mask);
+  if (look_at) result.layers = finders[eye].layers(bgr, region_around(*look_at), seen.found);
   return result;
 }
 
 void describe(Settings& settings, InstrumentOptions& options) {
   settings.path("segmentation", options.segmentation,
-                "how the instrument is found in the images: colour, or a network as model.onnx (input 1 x 3 x height x "
-                "width, RGB from 0 to 1; output 1 x classes x height x width)");
-  settings.integer("class", options.instrument_class, {0, 1000},
+                "how instruments are found in the images: learned (the project's network), colour, none (they are not "
+                "looked for), or a network of yours as model.onnx (docs/instruments.md)");
+  settings.integer("class", options.network.instrument_class, {0, 1000},
                    "the instrument's channel, from 0, where a network has several");
+  settings.vector3("mean_rgb", options.network.mean_rgb, {-255, 255},
+                   "subtracted from the RGB, 0 to 1, that a network of yours is given");
+  settings.vector3("deviation_rgb", options.network.deviation_rgb, {0, 255, true}, "by which what is left is divided");
+  settings.points("example_px", options.example_px,
+                  "an outline of the shaft (or one point on it, [x, y]) in the left image as recorded, at at_frame: "
+                  "from there on its colours count "
+                  "too");
+  settings.integer("at_frame", options.at_frame, {0, 1e9}, "the frame of example_px");
   settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
   settings.group("camera_from_robot", "how the axes of the tracks lie; palpate check finds it",
@@ -225,10 +277,11 @@ void describe(Settings& settings, InstrumentOptions& options) {
     if (!options.track_2.empty() && options.track.empty())
       throw BadInput("instrument.track_2 is given without instrument.track, expected both or only track");
     if (options.segmentation.extension() == ".onnx") return;
-    if (options.segmentation.filename() != "colour")
-      throw BadInput(fmt::format("instrument.segmentation is '{}', expected colour or a network as model.onnx",
-                                 options.segmentation.filename().string()));
-    options.segmentation = "colour";
+    const std::string word = options.segmentation.filename().string();
+    if (word != "learned" && word != "colour" && word != "none")
+      throw BadInput(fmt::format(
+          "instrument.segmentation is '{}', expected learned, colour, none or a network as model.onnx", word));
+    options.segmentation = word;
   });
 }
 
@@ -236,15 +289,16 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
                                      const RectifiedPair& static_frame, const cv::Mat& organ_mask)
     : state_(std::make_unique<State>()) {
   state_->rectification = rectification;
+  if (!options.example_px.empty()) state_->example = rectified_polygon_mask(rectification, around(options.example_px));
+  state_->example_frame = options.at_frame;
   for (const std::filesystem::path& track : {options.track, options.track_2})
     if (!track.empty()) state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
   state_->time_offset_s = options.time_offset_s;
-  if (options.segmentation != "colour")
-    for (int eye = 0; eye < 2; ++eye)
-      state_->networks.emplace_back(options.segmentation, options.instrument_class, rectification.size);
-  tbb::parallel_invoke([&] { state_->models[0] = learn_segmentation(static_frame.left, organ_mask); },
-                       [&] { state_->models[1] = learn_segmentation(static_frame.right, organ_mask); },
+  std::array<std::optional<InstrumentFinder>, 2> finders;
+  tbb::parallel_invoke([&] { finders[0].emplace(options, static_frame.left, organ_mask); },
+                       [&] { finders[1].emplace(options, static_frame.right, organ_mask); },
                        [&] { state_->rows = measure_row_offset(static_frame.left, static_frame.right); });
+  for (auto& finder : finders) state_->finders.push_back(std::move(*finder));
   state_->trackers.assign(kMostInstruments, TipTracker(rectification, state_->rows));
 }
 
@@ -256,13 +310,17 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   InstrumentObservations observations;
   observations.tips.resize(kMostInstruments);
   const std::array<const cv::Mat*, 2> images = {&pair.left, &pair.right};
+  if (!s.example.empty() && pair.index == s.example_frame && !pair.left.empty()) {
+    const ExampleColours colours = s.finders[0].learn(pair.left, s.example);
+    for (InstrumentFinder& finder : s.finders) finder.use(colours);
+  }
   std::array<SeenByEye, 2> seen;
   const auto see = [&](size_t eye) {
     if (!images[eye]->empty()) seen[eye] = s.see(*images[eye], eye);
   };
   tbb::parallel_invoke([&] { see(0); }, [&] { see(1); });
-  observations.left_mask = seen[0].mask;
-  observations.right_mask = seen[1].mask;
+  observations.left_mask = seen[0].found.mask;
+  observations.right_mask = seen[1].found.mask;
   for (size_t t = 0; t < s.tracks.size(); ++t) observations.tips[t] = s.trackers[t].update(s.row_of(s.tracks[t], pair));
   if (!s.tracks.empty()) return observations;
 
@@ -278,6 +336,7 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
     const auto view = [&](size_t eye) { views[eye] = s.view(*images[eye], seen[eye], t, eye, seconds); };
     tbb::parallel_invoke([&] { view(0); }, [&] { view(1); });
     observations.tips[t] = tracker.update(views[0], views[1], pair.index, seconds, touching[t]);
+    observations.tips[t].in_image = {views[0].tip, views[1].tip};
     if (tracker.visible()) ++s.frames_seen[t];
     if (tracker.visible() && tracker.eyes_out_of_step()) observations.eyes_out_of_step = true;
   }

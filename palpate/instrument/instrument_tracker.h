@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -8,7 +9,9 @@
 
 #include "palpate/core/geometry.h"
 #include "palpate/core/settings.h"
+#include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/hand_eye.h"
+#include "palpate/instrument/segmentation_network.h"
 #include "palpate/stereo/rig.h"
 
 namespace palpate {
@@ -18,8 +21,10 @@ inline constexpr size_t kMostInstruments = 2;
 
 /// `instrument` of the scene file.
 struct InstrumentOptions {
-  std::filesystem::path segmentation = "colour";  ///< how instruments are found in the images
-  int instrument_class = 1;                       ///< channel of a network with several
+  std::filesystem::path segmentation = "colour";  ///< learned, colour, none (in no image) or the user's network
+  NetworkOptions network;                         ///< of the user's network
+  std::vector<cv::Point2d> example_px;            ///< outline of an instrument's shaft, left image as recorded
+  int at_frame = 0;                               ///< in which the example lies
   std::filesystem::path track;                    ///< tip.csv instead of the images
   std::filesystem::path track_2;                  ///< the same for the second instrument
   CameraFromRobot camera_from_robot;              ///< axes of the tracks
@@ -36,7 +41,8 @@ struct TipObservation {
   Vec3 velocity_mm_per_s = Vec3::Zero();
   std::optional<Vec3> since_mark_mm;  ///< displacement since `mark`, better known than the tip itself
   Mat3 since_mark_covariance_mm2 = Mat3::Identity();
-  std::optional<bool> closed;  ///< jaws hold, where a tip track says so
+  std::optional<bool> closed;                       ///< jaws hold, where a tip track says so
+  std::array<std::optional<ImageTip>, 2> in_image;  ///< where the masks end, rectified left and right image
 };
 
 /// What one frame says about all instruments.

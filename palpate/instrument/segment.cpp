@@ -11,6 +11,7 @@ namespace palpate {
 namespace {
 
 constexpr int kColourNoise = 2;       // grey levels by which a grey pixel may look red
+constexpr int kOliveQuarters = 2;     // of the green over the blue that counts as red
 constexpr int kUnchanged = 24;        // grey levels between two pictures of the same still highlight
 constexpr int kNearSaturation = 200;  // both brighter than this: a highlight that flickers
 constexpr int kTissueMoves = 7;       // px at half size, twice the way and one
@@ -21,6 +22,8 @@ constexpr double kLeastContinued_px = 3;  // at half size
 constexpr double kLeastNew = 0.2;         // share of an instrument that was not there in the static frame
 constexpr double kLeftShare = 0.9;        // of a part that stood still, where tissue shows instead
 constexpr double kLit = 1.5;              // times the least value, to tell tissue from shadow
+constexpr double kBlack = 8;              // grey levels of what is around the picture
+constexpr double kBlackShare = 0.05;      // the same, of the picture's brightness, where the surround is lit a little
 constexpr int kDarkest = 12;              // grey levels
 constexpr double kPalest = 0.08;          // redness of tissue that can still be told from metal
 constexpr double kReddest = 0.6;
@@ -41,25 +44,18 @@ double percentile(std::vector<float>& values, double share) {
   return *at;
 }
 
+/// Red over green, and only a little of green over blue: metal may be olive or brown.
+int redness_of(int b, int g, int r) {
+  const int redness = r - g + (b < g ? ((g - b) * kOliveQuarters) / 4 : 0) - kColourNoise;
+  return redness > 0 ? redness : 0;
+}
+
 int redness_of(const cv::Vec3b& p) {
-  return std::max(0, p[2] - std::min(p[0], p[1]) - kColourNoise);
+  return redness_of(p[0], p[1], p[2]);
 }
 
 int value_of(const cv::Vec3b& p) {
   return std::max({p[0], p[1], p[2]});
-}
-
-/// Where the picture is: everything but the black surround that touches the image border.
-cv::Mat find_picture_area(const cv::Mat& bgr) {
-  cv::Mat value, channels[3];
-  cv::split(bgr, channels);
-  cv::max(channels[0], channels[1], value);
-  cv::max(value, channels[2], value);
-  cv::Mat black = value < 8;
-  cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
-  cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
-  cv::floodFill(black, cv::Point(0, 0), 128);
-  return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
 }
 
 /// How much pixels look like metal beside tissue of the given redness; see metalness.
@@ -77,8 +73,8 @@ cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, doub
     uchar* __restrict to = result.ptr<uchar>(y);
     for (int x = 0; x < columns; ++x) {
       const int b = blue[x], g = green[x], r = red[x];
-      const int least = b < g ? b : g, most = b < g ? g : b, value = r < most ? most : r;
-      const int redness = r - least > kColourNoise ? r - least - kColourNoise : 0;
+      const int most = b < g ? g : b, value = r < most ? most : r;
+      const int redness = redness_of(b, g, r);
       const float of_tissue = 255.0f * static_cast<float>(redness) / static_cast<float>(value * tissue[x] + 1);
       const float bright = per_least * static_cast<float>(value) - 1;
       const float lit = bright < 0 ? 0 : bright > 1 ? 1 : bright;
@@ -212,9 +208,13 @@ cv::Mat instrument_blobs(const cv::Mat& grey, const cv::Mat& half_picture_area) 
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   const double least_area = 0.0015 * mask.rows * mask.cols;
-  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U), inside;
+  cv::erode(half_picture_area, inside, cv::Mat::ones(5, 5, CV_8U), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
+  const auto at_border = [&inside](const cv::Point& p) { return !inside.at<uchar>(p); };
   for (size_t i = 0; i < outlines.size(); ++i) {
     if (cv::contourArea(outlines[i]) < least_area) continue;
+    // What only comes near it is, by its colours alone, as likely a highlight.
+    if (std::none_of(outlines[i].begin(), outlines[i].end(), at_border)) continue;
     cv::Mat blob = cv::Mat::zeros(mask.size(), CV_8U);
     cv::drawContours(blob, outlines, static_cast<int>(i), 255, cv::FILLED);
     if (find_tip(blob, half_picture_area)) result |= blob;
@@ -361,6 +361,23 @@ cv::Mat refine(const cv::Mat& bgr, const cv::Mat& coarse, const cv::Mat& sure, c
 }
 
 }  // namespace
+
+cv::Mat find_picture_area(const cv::Mat& bgr) {
+  cv::Mat value, channels[3];
+  cv::split(bgr, channels);
+  cv::max(channels[0], channels[1], value);
+  cv::max(value, channels[2], value);
+  std::vector<uchar> sorted;
+  for (int y = 0; y < value.rows; y += 4)
+    for (int x = 0; x < value.cols; x += 4) sorted.push_back(value.at<uchar>(y, x));
+  const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), bright, sorted.end());
+  cv::Mat black = value < std::max(kBlack, kBlackShare * *bright);
+  cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
+  cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+  cv::floodFill(black, cv::Point(0, 0), 128);
+  return black(cv::Rect(1, 1, bgr.cols, bgr.rows)) != 128;
+}
 
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model) {
   return metalness_beside(bgr(part), model.tissue_redness(part), model.least_value);

@@ -26,6 +26,9 @@ struct SegmentationModel {
   double least_value = 24;  ///< darker pixels have no colour to judge, grey levels
 };
 
+/// 255 where the picture is: everything but the dark surround that touches the border of the image.
+cv::Mat find_picture_area(const cv::Mat& bgr);
+
 /// Learns what is tissue from a static frame of one eye. `organ_mask` (255 = surely tissue; may be empty) narrows it.
 SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& organ_mask);
 
@@ -38,8 +41,8 @@ cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model);
 void forget_what_left(const cv::Mat& bgr, SegmentationModel& model);
 
 /// How much each pixel of a part of the image looks like metal, 8-bit: 255 = without any redness
-/// (r - min(g, b)) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark to
-/// tell.
+/// (r - g + (g - b) / 2) / max(r, g, b), 128 = half the redness of the tissue there, 0 = as red as tissue or too dark
+/// to tell.
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model);
 
 }  // namespace palpate

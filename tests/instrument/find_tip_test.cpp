@@ -65,10 +65,20 @@ TEST(FindTip, FindsNothingInAnEmptyMask) {
   EXPECT_FALSE(find_tip(cv::Mat::zeros(540, 960, CV_8U)));
 }
 
-TEST(FindTip, RejectsABlobThatDoesNotEnterFromTheBorder) {
+TEST(FindTip, RejectsABlobFarFromTheBorder) {
   cv::Mat mask = drawn_instrument({430, 300}, -160, 44, 80);
   mask(cv::Rect(600, 0, 360, 540)) = 0;
   EXPECT_FALSE(find_tip(mask));
+}
+
+TEST(FindTip, FindsTheTipWhereTheShaftIsTooDarkToBeSeen) {
+  const cv::Point2d tip(640.2, 330.4);
+  cv::Mat mask = drawn_instrument(tip, -160, 44, 80);
+  mask(cv::Rect(860, 0, 100, 540)) = 0;
+  const auto found = find_tip(mask);
+  ASSERT_TRUE(found);
+  EXPECT_LT(cv::norm(found->tip_px - tip), 3);
+  EXPECT_NEAR(found->axis.x, std::cos(-160 * CV_PI / 180), 0.05);
 }
 
 TEST(FindTip, RejectsARoundBlobAtTheBorder) {

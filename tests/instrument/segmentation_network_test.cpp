@@ -38,10 +38,43 @@ TEST(SegmentationNetwork, FindsTheInstrumentWithOneChannelOrSeveralAndInImagesOf
        {"--output sigmoid", "--output logit", "--output classes", "--output sigmoid --size 180 320"}) {
     const std::filesystem::path file = make_network(folder, arguments);
     NEEDS_NETWORK(file);
-    const SegmentationNetwork network(file, 1, image.size());
+    const SegmentationNetwork network(file, {}, image.size());
     const cv::Mat mask = network.mask(image);
     ASSERT_EQ(mask.size(), image.size()) << arguments;
     EXPECT_GT(overlap(mask, truth), 0.93) << arguments;
+  }
+}
+
+TEST(SegmentationNetwork, LetterBoxesImagesForAFixedInput) {
+  const TemporaryFolder folder;
+  const test::DrawnInstrument instrument;
+  const cv::Mat image = test::draw_pair({}, instrument, 1).left, truth = test::drawn_mask(instrument);
+  for (const char* arguments : {"--output logit --size 256 256", "--output classes --size 400 300",
+                                "--output sigmoid --size 256 320 --channels-last"}) {
+    const std::filesystem::path file = make_network(folder, arguments);
+    NEEDS_NETWORK(file);
+    EXPECT_GT(overlap(SegmentationNetwork(file, {}, image.size()).mask(image), truth), 0.9) << arguments;
+  }
+}
+
+TEST(SegmentationNetwork, NormalizesTheInputAsToldByKeys) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = make_network(folder, "--output logit --normalized 0.45 0.22");
+  NEEDS_NETWORK(file);
+  const test::DrawnInstrument instrument;
+  const cv::Mat image = test::draw_pair({}, instrument, 1).left, truth = test::drawn_mask(instrument);
+  const Vec3 mean = Vec3::Constant(0.45), deviation = Vec3::Constant(0.22);
+  EXPECT_GT(overlap(SegmentationNetwork(file, {1, mean, deviation}, image.size()).mask(image), truth), 0.93);
+  EXPECT_LT(overlap(SegmentationNetwork(file, {}, image.size()).mask(image), truth), 0.9);
+}
+
+TEST(SegmentationNetwork, OfTheProjectRunsOnImagesOfAnySize) {
+  for (const cv::Size size : {cv::Size(960, 540), cv::Size(640, 480), cv::Size(360, 288), cv::Size(1280, 1024)}) {
+    const SegmentationNetwork network(size);
+    const cv::Mat probability = network.probability(cv::Mat(size, CV_8UC3, cv::Scalar(60, 60, 140)));
+    EXPECT_TRUE(cv::checkRange(probability, true, nullptr, 0, 1 + 1e-6)) << size;
+    EXPECT_NEAR(1.0 * probability.cols / probability.rows, 1.0 * size.width / size.height, 0.2) << size;
+    EXPECT_EQ(network.mask(cv::Mat(size, CV_8UC3, cv::Scalar(60, 60, 140))).size(), size);
   }
 }
 
@@ -51,8 +84,8 @@ TEST(SegmentationNetwork, TellsClassesApart) {
   NEEDS_NETWORK(file);
   const test::DrawnInstrument instrument;
   const cv::Mat image = test::draw_pair({}, instrument, 1).left, truth = test::drawn_mask(instrument);
-  EXPECT_GT(overlap(SegmentationNetwork(file, 0, image.size()).mask(image), ~truth), 0.93);
-  EXPECT_EQ(cv::countNonZero(SegmentationNetwork(file, 2, image.size()).mask(image)), 0);
+  EXPECT_GT(overlap(SegmentationNetwork(file, {.instrument_class = 0}, image.size()).mask(image), ~truth), 0.93);
+  EXPECT_EQ(cv::countNonZero(SegmentationNetwork(file, {.instrument_class = 2}, image.size()).mask(image)), 0);
 }
 
 TEST(SegmentationNetwork, ReplacesTheColours) {
@@ -73,15 +106,16 @@ TEST(SegmentationNetwork, ReplacesTheColours) {
 TEST(SegmentationNetwork, SaysWhatIsWrongWithIt) {
   const TemporaryFolder folder;
   const auto complaint = [&](const std::filesystem::path& file, int instrument_class = 1) {
-    return sentence_of([&] { SegmentationNetwork(file, instrument_class, {640, 360}); });
+    return sentence_of([&] { SegmentationNetwork(file, {.instrument_class = instrument_class}, {640, 360}); });
   };
   EXPECT_THAT(complaint(folder / "missing.onnx"), HasSubstr("missing.onnx: there is no such file"));
   EXPECT_THAT(complaint(folder.write("text.onnx", "no network at all")), HasSubstr("cannot be read"));
   const std::filesystem::path classes = make_network(folder, "--output classes");
   NEEDS_NETWORK(classes);
   EXPECT_THAT(complaint(classes, 3), AllOf(HasSubstr("instrument.class is 3"), HasSubstr("0 to 2")));
+  EXPECT_THAT(complaint(make_network(folder, "--flaw unknown-layer --output logit")), HasSubstr("Bernoulli"));
   EXPECT_THAT(complaint(make_network(folder, "--flaw two-outputs --output logit")), HasSubstr("2 outputs"));
-  EXPECT_THAT(complaint(make_network(folder, "--flaw flat --output logit")), HasSubstr("the output is 1 x 230400"));
+  EXPECT_THAT(complaint(make_network(folder, "--flaw flat --output logit")), HasSubstr("the output is 1 x 245760"));
 }
 
 }  // namespace
