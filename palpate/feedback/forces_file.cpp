@@ -63,6 +63,8 @@ ForceRow parse_row(const CsvTable& table, const CsvTable::Row& line, const std::
   row.frame_ms = finite_or(number("frame_ms"), 0);
   row.misfit_mm = finite_or(number("misfit_mm"), 0);
   row.warnings = table.text(line, "warnings");
+  row.force_low_N = number("force_low_N");
+  row.force_high_N = number("force_high_N");
   return row;
 }
 

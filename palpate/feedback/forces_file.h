@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,7 +27,11 @@ struct ForceRow {
   double frame_ms = 0;
   double misfit_mm = 0;
   std::string warnings;  ///< names separated by ";"
+  /// 95 % band of the magnitude; NaN where the file names none.
+  double force_low_N = std::numeric_limits<double>::quiet_NaN();
+  double force_high_N = std::numeric_limits<double>::quiet_NaN();
 
+  bool has_band() const { return std::isfinite(force_low_N) && std::isfinite(force_high_N); }
   bool has_tip() const { return status != "tool_lost" && tip_mm.allFinite(); }
 };
 
