@@ -188,10 +188,10 @@ Eigen::VectorXd TetModel::reduce(const Eigen::VectorXd& full) const {
 }
 
 Eigen::VectorXd TetModel::expand(const Eigen::VectorXd& reduced) const {
-  Eigen::VectorXd full = Eigen::VectorXd::Zero(3 * node_count());
+  Eigen::VectorXd full = base_.size() > 0 ? base_ : Eigen::VectorXd::Zero(3 * node_count());
   for (size_t n = 0; n < first_unknown_.size(); ++n)
     if (first_unknown_[n] >= 0)
-      full.segment<3>(3 * static_cast<Eigen::Index>(n)) = reduced.segment<3>(first_unknown_[n]);
+      full.segment<3>(3 * static_cast<Eigen::Index>(n)) += reduced.segment<3>(first_unknown_[n]);
   return full;
 }
 

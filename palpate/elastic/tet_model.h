@@ -58,9 +58,12 @@ class TetModel {
   /// Whether the law is in its valid range in every element.
   bool in_valid_range(const Eigen::VectorXd& u) const;
 
-  /// The entries of a full vector that belong to unknowns, and back (zero at fixed nodes).
+  /// The entries of a full vector that belong to unknowns, and the displacement of all nodes that unknowns stand for:
+  /// they count from the base, which is zero unless set.
   Eigen::VectorXd reduce(const Eigen::VectorXd& full) const;
   Eigen::VectorXd expand(const Eigen::VectorXd& reduced) const;
+  /// A displacement of all nodes, 3 n, mm, that unknowns count from; it is where fixed nodes are.
+  void set_base(const Eigen::VectorXd& u) { base_ = u; }
 
  private:
   /// The elements around one node, a quarter of each: they share one volume ratio.
@@ -103,6 +106,7 @@ class TetModel {
   std::vector<double> rest_volume_mm3_;
   std::vector<int> first_unknown_;
   int unknown_count_ = 0;
+  Eigen::VectorXd base_;  // empty = zero
   Eigen::SparseMatrix<double> pattern_;
   std::vector<Scatter> scatter_;               // one per element
   std::shared_ptr<const ElementPacks> packs_;  // what the loops over elements run on

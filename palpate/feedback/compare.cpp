@@ -12,6 +12,9 @@
 namespace palpate {
 namespace {
 
+constexpr double kLoadedShare = 0.05;  // of the true peak
+constexpr int kFramesToNotice = 2;     // at the beginning of a contact
+
 /// Truth and estimate of the same frame, side by side, ascending in frame.
 struct Pairing {
   std::vector<int> frame;
@@ -19,6 +22,9 @@ struct Pairing {
   Eigen::VectorXd true_force, force;             // magnitudes, N
   Eigen::Matrix3Xd true_vector, vector;          // N
   std::vector<std::optional<double>> tip_error;  // mm
+  std::vector<char> ok;                          // status of the estimate
+  std::vector<double> low_N, high_N;             // of its band
+  bool has_band = false;
   int missing = 0;
 };
 
@@ -48,6 +54,9 @@ Pairing pair_up(const std::vector<ForceRow>& estimate, const std::vector<ForceRo
     p.true_vector.col(i) = t.force_N;
     p.contact.push_back(false);
     p.tip_error.emplace_back();
+    p.ok.push_back(false);
+    p.low_N.push_back(0);
+    p.high_N.push_back(0);
     const auto found = estimates.find(frame);
     if (found == estimates.end()) {
       ++p.missing;
@@ -57,10 +66,21 @@ Pairing pair_up(const std::vector<ForceRow>& estimate, const std::vector<ForceRo
       p.force[i] = finite_or_zero(e.force_magnitude_N);
       p.vector.col(i) = e.force_N.unaryExpr(&finite_or_zero);
       if (e.has_tip() && t.has_tip()) p.tip_error.back() = (e.tip_mm - t.tip_mm).norm();
+      p.ok.back() = e.status == "ok";
+      if (e.has_band()) {
+        p.has_band = true;
+        p.low_N.back() = e.force_low_N;
+        p.high_N.back() = e.force_high_N;
+      }
     }
     ++i;
   }
   return p;
+}
+
+/// Frames in which the force is worth judging.
+bool is_loaded(const Pairing& p, const Comparison& c, size_t i) {
+  return p.true_force[static_cast<Eigen::Index>(i)] > kLoadedShare * c.true_peak_N;
 }
 
 std::optional<double> correlation(const Eigen::ArrayXd& a, const Eigen::ArrayXd& b) {
@@ -116,7 +136,10 @@ void compare_magnitudes(const Pairing& p, Comparison& c) {
     c.gain = p.force.dot(p.true_force) / p.true_force.squaredNorm();
   }
   std::vector<double> in_contact;
+  int since_onset = 0;
   for (size_t i = 0; i < p.frame.size(); ++i) {
+    since_onset = p.true_contact[i] ? since_onset + 1 : 0;
+    c.missed_force_frames += since_onset > kFramesToNotice && is_loaded(p, c, i) && !p.contact[i];
     const double force = p.force[static_cast<Eigen::Index>(i)];
     if (p.true_contact[i]) {
       in_contact.push_back(error[static_cast<Eigen::Index>(i)]);
@@ -134,6 +157,10 @@ void compare_vectors(const Pairing& p, Comparison& c) {
   const Eigen::Matrix3Xd error = p.vector - p.true_vector;
   c.vector_rmse_N = std::sqrt(error.squaredNorm() / c.frames);
   c.vector_correlation = correlation(p.vector.reshaped().array(), p.true_vector.reshaped().array());
+  for (size_t i = 0; i < p.frame.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    c.reversed_ok_frames += p.ok[i] && is_loaded(p, c, i) && p.vector.col(column).dot(p.true_vector.col(column)) < 0;
+  }
   std::vector<double> cosines, angles_deg;
   for (Eigen::Index i = 0; i < p.force.size(); ++i) {
     const double length = p.vector.col(i).norm();
@@ -172,6 +199,22 @@ void compare_tips(const Pairing& p, Comparison& c) {
   c.tip_rmse_contact_mm = root_mean_square(in_contact);
 }
 
+void compare_bands(const Pairing& p, Comparison& c) {
+  if (!p.has_band) return;
+  int loaded = 0, inside = 0;
+  double width_N = 0;
+  for (size_t i = 0; i < p.frame.size(); ++i) {
+    if (!is_loaded(p, c, i)) continue;
+    const double force = p.true_force[static_cast<Eigen::Index>(i)];
+    ++loaded;
+    inside += p.low_N[i] <= force && force <= p.high_N[i];
+    width_N += p.high_N[i] - p.low_N[i];
+  }
+  if (loaded == 0) return;
+  c.band_coverage_pct = 100.0 * inside / loaded;
+  c.band_half_width_pct = 50 * width_N / loaded / c.true_peak_N;
+}
+
 template <class T>
 Figure figure(const std::optional<T>& value) {
   return value ? Figure(*value) : Figure();
@@ -189,6 +232,7 @@ Comparison compare(const std::vector<ForceRow>& estimate, const std::vector<Forc
   compare_vectors(pairing, c);
   compare_times(pairing, c);
   compare_tips(pairing, c);
+  compare_bands(pairing, c);
   return c;
 }
 
@@ -214,11 +258,15 @@ std::vector<std::pair<std::string, Figure>> figures_of(const Comparison& c) {
           {"release_error_frames", figure(c.release_error_frames)},
           {"false_contact_frames", c.false_contact_frames},
           {"missed_contact_frames", c.missed_contact_frames},
+          {"missed_force_frames", c.missed_force_frames},
+          {"reversed_ok_frames", c.reversed_ok_frames},
           {"force_onset_error_frames", figure(c.force_onset_error_frames)},
           {"false_force_max_N", c.false_force_max_N},
           {"tip_frames", c.tip_frames},
           {"tip_rmse_mm", figure(c.tip_rmse_mm)},
-          {"tip_rmse_contact_mm", figure(c.tip_rmse_contact_mm)}};
+          {"tip_rmse_contact_mm", figure(c.tip_rmse_contact_mm)},
+          {"band_coverage_pct", figure(c.band_coverage_pct)},
+          {"band_half_width_pct", figure(c.band_half_width_pct)}};
 }
 
 std::string figure_text(const Figure& figure) {

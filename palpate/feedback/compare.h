@@ -35,11 +35,19 @@ struct Comparison {
   std::optional<int> release_error_frames;
   int false_contact_frames = 0;  ///< in_contact, or a force above 1 % of the true peak, without true contact
   int missed_contact_frames = 0;
+  /// Of these, from the third frame of a contact on, with a true force above 5 % of its peak.
+  int missed_force_frames = 0;
+  /// Status ok, and more than 90 degrees off while the true force is above 5 % of its peak.
+  int reversed_ok_frames = 0;
   std::optional<int> force_onset_error_frames;  ///< by 10 % of the true peak, free of contact labels
   double false_force_max_N = 0;
   int tip_frames = 0;
   std::optional<double> tip_rmse_mm;
   std::optional<double> tip_rmse_contact_mm;
+  /// Of the 95 % band, where the true force is above 5 % of its peak; empty where no row has a band. A frame without
+  /// one counts as a band from 0 to 0.
+  std::optional<double> band_coverage_pct;
+  std::optional<double> band_half_width_pct;  ///< mean, of the true peak
 };
 
 /// Throws BadInput when the truth is empty or a magnitude in it is not finite.

@@ -87,6 +87,7 @@ ForceRow to_row(const ForceEstimate& estimate) {
   row.status = status_name(status);
   row.frame_ms = finite_or(estimate.times.total_ms(), 0);
   row.warnings = joined(estimate.warnings);
+  row.force_low_N = row.force_high_N = 0;
   row.scene_mm = estimate.scene_mm.allFinite() ? estimate.scene_mm : Vec3::Zero();
   if (status == FrameStatus::tool_lost) return row;
 

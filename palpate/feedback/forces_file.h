@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,13 +27,16 @@ struct ForceRow {
   double frame_ms = 0;
   double misfit_mm = 0;
   std::string warnings;  ///< names separated by ";"
-  double force_low_N = 0, force_high_N = 0;  ///< 95 % band; NaN where a file has none
+  /// 95 % band of the magnitude; NaN where the file names none.
+  double force_low_N = std::numeric_limits<double>::quiet_NaN();
+  double force_high_N = std::numeric_limits<double>::quiet_NaN();
   double force_low_total_N = 0, force_high_total_N = 0;
   std::string grip = "free";
   double p_contact = 0;
   double footprint_mm = 0;
   Vec3 scene_mm = Vec3::Zero();
 
+  bool has_band() const { return std::isfinite(force_low_N) && std::isfinite(force_high_N); }
   bool has_tip() const { return status != "tool_lost" && tip_mm.allFinite(); }
 };
 

@@ -84,7 +84,8 @@ DejaVuSummary simulate_dejavu(const SimulateOptions& options, const TissueOption
     touches.push_back(find_touch_point(organ, options.camera, approach.at_px));
     contacts.push_back({touches.back().point_mm, touches.back().axes.col(0),
                         approach.footprint_radius_mm > 0 ? approach.footprint_radius_mm : contact.footprint_radius_mm,
-                        is_push(gesture) ? longest_drag_mm(gesture) : 0});
+                        is_push(gesture) ? longest_drag_mm(gesture) : 0, options.truth.patch,
+                        touches.back().axes.col(1)});
   };
   touch(options.gesture);
   if (options.second.present) touch(options.second.gesture);

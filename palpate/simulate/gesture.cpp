@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "palpate/core/errors.h"
@@ -107,8 +106,8 @@ void check_gesture(const std::vector<GestureRow>& rows) {
   if (!approached) throw BadInput("simulate.gesture: no row with approach_s and at_px");
 }
 
-Vec3 breath_mm(const SimulatedBreathing& breathing, double time_s) {
-  return 0.5 * (1 - std::cos(2 * std::numbers::pi * time_s / breathing.period_s)) * breathing.motion_mm;
+bool is_push(const std::vector<GestureRow>& rows) {
+  return std::any_of(rows.begin(), rows.end(), [](const GestureRow& row) { return row.push; });
 }
 
 double gesture_duration_s(const std::vector<GestureRow>& rows) {
@@ -117,14 +116,14 @@ double gesture_duration_s(const std::vector<GestureRow>& rows) {
   return total;
 }
 
+double touch_time_s(const std::vector<GestureRow>& rows) {
+  return start_of(rows, is_push(rows) ? Action::push : Action::grasp);
+}
+
 const GestureRow& approach_row(const std::vector<GestureRow>& rows) {
   for (const GestureRow& row : rows)
     if (row.approach_s > 0) return row;
   throw std::invalid_argument("approach_row: the gesture has none");
-}
-
-bool is_push(const std::vector<GestureRow>& rows) {
-  return std::any_of(rows.begin(), rows.end(), [](const GestureRow& row) { return row.push; });
 }
 
 double longest_drag_mm(const std::vector<GestureRow>& rows) {

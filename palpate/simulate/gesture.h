@@ -32,12 +32,11 @@ bool is_push(const std::vector<GestureRow>& rows);
 /// How far along the tangents the moves go, at most.
 double longest_drag_mm(const std::vector<GestureRow>& rows);
 
+/// When the contact begins, s; the end of the gesture where there is none.
+double touch_time_s(const std::vector<GestureRow>& rows);
+
 /// The row in which the tissue is approached.
 const GestureRow& approach_row(const std::vector<GestureRow>& rows);
-
-/// By how much the whole scene is displaced: motion_mm (1 - cos(2 pi t / period_s)) / 2, so that the first frame is at
-/// rest and the motion has no jump in velocity.
-Vec3 breath_mm(const SimulatedBreathing& breathing, double time_s);
 
 /// 10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan 1985), 0 before t = 0 and 1 after t = 1.
 double minimum_jerk(double t);

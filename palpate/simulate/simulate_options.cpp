@@ -109,12 +109,20 @@ void describe_look(Settings& settings, SimulatedLook& look) {
   settings.after_reading([&look] { settle_word_or_file("simulate.look.texture", look.texture, {"procedural"}); });
 }
 
+void describe_pan(Settings& settings, SimulatedPan& pan) {
+  settings.vector3("by_mm", pan.by_mm, {-100, 100}, "how far, smoothly from rest to rest; the axes do not turn, mm");
+  settings.number("from_s", pan.from_s, {0, 600}, "when it begins, s");
+  settings.number("during_s", pan.during_s, {0, 600, true}, "how long it takes, s");
+}
+
 void describe_camera(Settings& settings, SimulatedCamera& camera) {
   settings.integer("width", camera.width, {64, 8192}, "of one image, px");
   settings.integer("height", camera.height, {64, 8192}, "of one image, px");
   settings.number("focal_px", camera.focal_px, {10, 100000}, "focal length, px");
   settings.number("baseline_mm", camera.baseline_mm, {1, 200}, "distance between the eyes, mm");
   settings.number("fps", camera.fps, {1, 1000}, "frames per second");
+  settings.group("pan", "both cameras move while patient and trocar stand; truth.csv is in the moving camera's frame",
+                 [&camera](Settings& s) { describe_pan(s, camera.pan); });
   settings.after_reading([&camera] {
     if (camera.width % 2 != 0 || camera.height % 2 != 0)
       throw BadInput(fmt::format("simulate.camera: the video needs an even width and height, not {} x {}", camera.width,
@@ -146,8 +154,33 @@ void describe_instrument(Settings& settings, SimulatedInstrument& instrument) {
 
 void describe_breathing(Settings& settings, SimulatedBreathing& breathing) {
   settings.vector3("motion_mm", breathing.motion_mm, {-100, 100},
-                   "how far the whole scene has moved half a period after the start, left camera frame, mm");
+                   "how far organ and background have moved half a period after the start, left camera frame, mm");
   settings.number("period_s", breathing.period_s, {0.1, 60}, "time of one breath, s");
+  using Instrument = SimulatedBreathing::Instrument;
+  settings.choice("instrument", breathing.instrument,
+                  {{"follows", Instrument::follows}, {"stands", Instrument::stands}},
+                  "stands: the hand keeps its own path and meets the tissue where it is at the touch, so that the true "
+                  "force breathes; follows: moves of the gesture are measured from the moving tissue, and the force is "
+                  "the same without; also where heart or stretch move the tissue");
+}
+
+void describe_heart(Settings& settings, SimulatedHeart& heart) {
+  settings.vector3("motion_mm", heart.motion_mm, {-100, 100},
+                   "how far organ and background have moved half a period after the start, left camera frame, mm");
+  settings.number("period_s", heart.period_s, {0.1, 60}, "time of one beat, s");
+}
+
+void describe_stretch(Settings& settings, SimulatedStretch& stretch) {
+  settings.vector3("strain", stretch.strain, {-0.2, 0.2},
+                   "of the attached nodes about simulate.body.center_mm, along x, y, z of the left camera, half a "
+                   "period after the start; the tissue between them follows in equilibrium");
+  settings.number("period_s", stretch.period_s, {0.1, 60}, "time of there and back, s");
+}
+
+void describe_obscured(Settings& settings, SimulatedObscured& obscured) {
+  settings.number("from_s", obscured.from_s, {0, 600}, "from this time on, s");
+  settings.number("to_s", obscured.to_s, {0, 600}, "until before this time; not after from_s = never, s");
+  settings.number("radius_mm", obscured.radius_mm, {0, 100, true}, "radius of the ball of gauze, mm");
 }
 
 void describe_gesture_row(Settings& settings, GestureRow& row) {
@@ -184,6 +217,17 @@ void describe_second(Settings& settings, SimulatedSecond& second) {
                    "as simulate.gesture; until it grasps, the instrument follows tissue that the first one moves");
 }
 
+void describe_truth(Settings& settings, SimulatedTruth& truth) {
+  using Patch = SimulatedTruth::Patch;
+  settings.choice("patch", truth.patch,
+                  {{"disc", Patch::disc},
+                   {"ellipse", Patch::ellipse},
+                   {"soft_rim", Patch::soft_rim},
+                   {"two_jaws", Patch::two_jaws}},
+                  "rigid disc; rigid ellipse 1:2 of the same area; a weighted mean that fades from half the radius to "
+                  "1.3 times; two rigid discs side by side that move together");
+}
+
 void describe_files(Settings& settings, SimulatedFiles& files) {
   settings.flag("surface", files.surface, "surface/frame_0000.ply ...: the organ in each frame, left camera frame, mm");
   settings.flag("depth", files.depth,
@@ -205,11 +249,14 @@ void describe(Settings& settings, SimulateOptions& options) {
   settings.group("camera", "both eyes", [&](Settings& s) { describe_camera(s, options.camera); });
   settings.group("instrument", "what touches the tissue",
                  [&](Settings& s) { describe_instrument(s, options.instrument); });
-  settings.group(
-      "breathing",
-      "the whole scene moves by motion_mm (1 - cos(2 pi t / period_s)) / 2; moves of the gesture are measured "
-      "from the moving tissue, so that the force is the same without",
-      [&](Settings& s) { describe_breathing(s, options.breathing); });
+  settings.group("breathing", "organ and background move by motion_mm (1 - cos(2 pi t / period_s)) / 2",
+                 [&](Settings& s) { describe_breathing(s, options.breathing); });
+  settings.group("heart", "the same once more, faster, added to breathing",
+                 [&](Settings& s) { describe_heart(s, options.heart); });
+  settings.group("stretch", "the attachments are strained by strain (1 - cos(2 pi t / period_s)) / 2",
+                 [&](Settings& s) { describe_stretch(s, options.stretch); });
+  settings.group("obscured", "gauze before the tip, in both images; the tip counts as not visible then",
+                 [&](Settings& s) { describe_obscured(s, options.obscured); });
   describe_gesture(
       settings, options.gesture,
       "what the instrument does, row after row, smooth in between; each row has exactly one of approach_s, "
@@ -217,10 +264,14 @@ void describe(Settings& settings, SimulateOptions& options) {
   settings.group(
       "second", "another instrument at work at the same time (truth_2.csv); both have to grasp",
       [&](Settings& s) { describe_second(s, options.second); }, &options.second.present);
+  settings.group("truth", "what the instrument holds in the truth where it grasps; elements: simulate.body.elements",
+                 [&](Settings& s) { describe_truth(s, options.truth); });
   settings.group("write", "what is written besides the recording and its truth",
                  [&](Settings& s) { describe_files(s, options.write); });
   settings.after_reading([&options] {
     check_gesture(options.gesture);
+    if (is_push(options.gesture) && options.truth.patch != SimulatedTruth::Patch::disc)
+      throw BadInput("simulate.truth.patch: a tip that pushes has a disc, and the gesture pushes");
     if (!options.second.present) return;
     check_gesture(options.second.gesture);
     if (is_push(options.gesture) || is_push(options.second.gesture))

@@ -68,6 +68,13 @@ struct SimulatedLook {
   bool interlace = false;  ///< odd rows are half a frame later
 };
 
+/// `simulate.camera.pan`: patient and trocar stand, both cameras move, smoothly from rest to rest.
+struct SimulatedPan {
+  Vec3 by_mm = Vec3::Zero();  ///< axes of the left camera, which do not turn
+  double from_s = 0;
+  double during_s = 2;
+};
+
 /// `simulate.camera`: both eyes alike, parallel, no distortion, principal point in the middle of the image.
 struct SimulatedCamera {
   int width = 960;
@@ -75,6 +82,7 @@ struct SimulatedCamera {
   double focal_px = 700;
   double baseline_mm = 5;
   double fps = 25;
+  SimulatedPan pan = {};
 };
 
 /// `simulate.instrument`.
@@ -108,10 +116,36 @@ struct SimulatedSecond {
   std::vector<GestureRow> gesture;
 };
 
-/// `simulate.breathing`: the whole scene (organ, what lies behind it, instrument) goes there and back.
+/// `simulate.breathing`: organ and what lies behind it go there and back.
 struct SimulatedBreathing {
   Vec3 motion_mm = Vec3::Zero();  ///< from expired (where the sequence begins) to inspired, left camera frame
   double period_s = 4;
+  /// Whether the hand goes with the tissue or keeps its own path; also where heart or stretch move the tissue.
+  enum class Instrument { follows, stands } instrument = Instrument::stands;
+};
+
+/// `simulate.heart`: a second motion like breathing, added to it.
+struct SimulatedHeart {
+  Vec3 motion_mm = Vec3::Zero();
+  double period_s = 0.83;
+};
+
+/// `simulate.stretch`: the attachments follow an affine motion about the middle of the body, there and back.
+struct SimulatedStretch {
+  Vec3 strain = Vec3::Zero();  ///< along x, y, z of the left camera, half a period after the start
+  double period_s = 4;
+};
+
+/// `simulate.obscured`: gauze before the tip, in both images, at from_s <= time < to_s.
+struct SimulatedObscured {
+  double from_s = 0;
+  double to_s = 0;       ///< not after from_s = never
+  double radius_mm = 8;  ///< of the ball
+};
+
+/// `simulate.truth`: where the true contact is not the estimator's rigid disc; of a grasp.
+struct SimulatedTruth {
+  enum class Patch { disc, ellipse, soft_rim, two_jaws } patch = Patch::disc;
 };
 
 /// `simulate.write`: what is written besides the recording and its truth.
@@ -129,8 +163,12 @@ struct SimulateOptions {
   SimulatedCamera camera;
   SimulatedInstrument instrument;
   SimulatedBreathing breathing;
+  SimulatedHeart heart;
+  SimulatedStretch stretch;
+  SimulatedObscured obscured;
   std::vector<GestureRow> gesture;
   SimulatedSecond second;
+  SimulatedTruth truth;
   SimulatedFiles write;
 };
 

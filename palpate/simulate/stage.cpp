@@ -9,12 +9,17 @@
 #include "palpate/core/errors.h"
 #include "palpate/simulate/estimate_look.h"
 #include "palpate/simulate/instrument_look.h"
+#include "palpate/simulate/organ_shape.h"
+#include "palpate/simulate/scene_motion.h"
 #include "palpate/volume/polygon_soup.h"
 
 namespace palpate {
 namespace {
 
 const double kWallBehind_mm = 14;
+const int kGauzeSubdivisions = 4;
+const double kGauzeBefore_mm = 1;        // nearer to the camera than the tip
+const Vec3 kOutOfSight_mm(0, 0, -1000);  // behind the cameras
 
 // The back of the cavity: a shallow bowl behind the organ that fills both images.
 Surface make_wall(const SimulatedCamera& camera, const Surface& organ) {
@@ -72,6 +77,13 @@ std::vector<Vec3> moved_by(std::vector<Vec3> points_mm, const Vec3& by_mm) {
   return points_mm;
 }
 
+// A ball around the origin.
+Surface make_gauze(double radius_mm) {
+  Surface gauze = make_sphere(kGauzeSubdivisions);
+  for (Vec3& vertex : gauze.vertices_mm) vertex *= radius_mm;
+  return gauze;
+}
+
 }  // namespace
 
 Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth, const Moment& first)
@@ -79,6 +91,7 @@ Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBo
       tissue_(take_look(options_)),
       organ_(organ),
       wall_(make_wall(options.camera, organ)),
+      gauze_(make_gauze(options.obscured.radius_mm)),
       shown_organ_(organ),
       skin_(attach_skin(organ.vertices_mm, truth.mesh.nodes_mm, truth.boundary)),
       renderer_(options_.camera, options_.look) {
@@ -93,18 +106,28 @@ Stage::Stage(const SimulateOptions& options, const Surface& organ, const TruthBo
     second_instrument_number_ =
         renderer_.add(make_instrument(options.second.instrument, first.second_place),
                       instrument_look(options.second.instrument, first.second_place, look.seed + 1));
+  if (options.obscured.to_s > options.obscured.from_s) {
+    gauze_number_ = renderer_.add(gauze_, {gauze_texture(), texels_per_mm(first.place.tip_mm.z()), 0.8, 0.02});
+    renderer_.move(gauze_number_, moved_by(gauze_.vertices_mm, kOutOfSight_mm));
+  }
 }
 
 void Stage::show(const Moment& moment) {
   shown_organ_.vertices_mm = moved_by(
-      moment.u.size() == 0 ? organ_.vertices_mm : moved_skin(skin_, organ_.vertices_mm, moment.u), moment.breath_mm);
+      moment.u.size() == 0 ? organ_.vertices_mm : moved_skin(skin_, organ_.vertices_mm, moment.u), moment.scene_mm);
   renderer_.move(organ_number_, shown_organ_.vertices_mm);
-  if (options_.breathing.motion_mm != Vec3::Zero())
-    renderer_.move(wall_number_, moved_by(wall_.vertices_mm, moment.breath_mm));
+  if (moment.scene_mm != shown_scene_mm_) renderer_.move(wall_number_, moved_by(wall_.vertices_mm, moment.scene_mm));
+  shown_scene_mm_ = moment.scene_mm;
   renderer_.move(instrument_number_, make_instrument(options_.instrument, moment.place).vertices_mm);
   if (options_.second.present)
     renderer_.move(second_instrument_number_,
                    make_instrument(options_.second.instrument, moment.second_place).vertices_mm);
+  if (gauze_number_ >= 0) {
+    const Vec3& tip_mm = moment.place.tip_mm;
+    const Vec3 before_tip_mm = tip_mm - (options_.obscured.radius_mm + kGauzeBefore_mm) * tip_mm.normalized();
+    const bool here = is_obscured(options_.obscured, moment.truth.time_s);
+    renderer_.move(gauze_number_, moved_by(gauze_.vertices_mm, here ? before_tip_mm : kOutOfSight_mm));
+  }
 }
 
 }  // namespace palpate

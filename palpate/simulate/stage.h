@@ -5,7 +5,7 @@
 
 namespace palpate {
 
-/// The surfaces that are drawn: organ, the wall of the cavity behind it, instruments.
+/// The surfaces that are drawn: organ, the wall of the cavity behind it, instruments, gauze.
 class Stage {
  public:
   /// `organ` at rest; the instruments as in the `first` moment. Throws BadInput when a picture that the look is taken
@@ -25,10 +25,11 @@ class Stage {
  private:
   SimulateOptions options_;
   Texture tissue_;
-  Surface organ_, wall_, shown_organ_;
+  Surface organ_, wall_, gauze_, shown_organ_;
+  Vec3 shown_scene_mm_ = Vec3::Zero();
   Skin skin_;
   Renderer renderer_;
-  int organ_number_ = 0, wall_number_ = 0, instrument_number_ = 0, second_instrument_number_ = -1;
+  int organ_number_ = 0, wall_number_ = 0, instrument_number_ = 0, second_instrument_number_ = -1, gauze_number_ = -1;
 };
 
 }  // namespace palpate

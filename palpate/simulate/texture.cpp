@@ -164,6 +164,16 @@ Texture wall_texture(int seed_number) {
   };
 }
 
+Texture gauze_texture() {
+  return [](const Vec3& rest_mm, const Vec3&) {
+    const Eigen::Vector3f p = rest_mm.cast<float>();
+    const float weave = std::sin(5 * p.x()) * std::sin(5 * p.y()) + 0.5f * fractal_noise(p / 4.0f, 11, 3).value;
+    Texel texel;
+    texel.albedo = Colour(0.72f, 0.70f, 0.66f) * std::clamp(1 + 0.15f * weave, 0.5f, 1.3f);
+    return texel;
+  };
+}
+
 Texture steel_texture() {
   return [](const Vec3& rest_mm, const Vec3&) {
     const float streak = gradient_noise(rest_mm.cast<float>() / 2.5f, 7).value;

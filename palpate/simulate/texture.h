@@ -31,6 +31,9 @@ Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed);
 /// The wall of the cavity behind the organ: darker, browner, fat and vessels.
 Texture wall_texture(int seed);
 
+/// White cloth, woven.
+Texture gauze_texture();
+
 /// Brushed steel.
 Texture steel_texture();
 

@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "palpate/contact/footprint.h"
+#include "palpate/simulate/simulate_options.h"
 #include "palpate/volume/attachments.h"
 #include "palpate/volume/tetrahedralize.h"
 
@@ -14,13 +15,18 @@ struct TruthContact {
   Vec3 normal = Vec3::UnitZ();  ///< outward
   double radius_mm = 0;         ///< of the patch
   double drag_mm = 0;           ///< how far it is dragged over the surface
+  SimulatedTruth::Patch shape = SimulatedTruth::Patch::disc;
+  Vec3 along = Vec3::UnitX();  ///< tangent: long axis of an ellipse, from jaw to jaw
 };
 
 /// What an instrument holds of a body.
 struct TruthPatch {
-  Footprint footprint;   ///< every surface node of the patch, tied to one displacement
+  Footprint footprint;   ///< every surface node of the patch, tied to one displacement, or a mean of them
   double radius_mm = 0;  ///< of a disc with the area that the tied nodes move along
 };
+
+/// By how much a patch is moved in a state u (mm, three entries per node).
+Vec3 patch_moved_mm(const TruthPatch& patch, const Eigen::VectorXd& u);
 
 /// The body whose forces count as true: finer than the estimator's map and cut differently.
 struct TruthBody {

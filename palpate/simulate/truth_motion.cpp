@@ -8,9 +8,11 @@
 
 #include "palpate/contact/equilibrium.h"
 #include "palpate/core/errors.h"
+#include "palpate/simulate/free_tissue.h"
 #include "palpate/simulate/gesture.h"
 #include "palpate/simulate/pushed_tissue.h"
 #include "palpate/simulate/ray_scene.h"
+#include "palpate/simulate/scene_motion.h"
 
 namespace palpate {
 namespace {
@@ -21,15 +23,16 @@ bool inside(const SimulatedCamera& camera, cv::Point2d px) {
   return px.x >= 0 && px.y >= 0 && px.x <= camera.width - 1 && px.y <= camera.height - 1;
 }
 
+// `met_mm`: by how much the tissue had moved where it is touched; `carried_mm`: by how much the hand goes with it.
 InstrumentPlace place_instrument(const SimulatedInstrument& instrument, const TouchPoint& touch,
-                                 const GesturePose& pose, const Vec3& tissue_moved_mm, const Vec3& breath_mm) {
-  const Vec3 at_tissue = touch.point_mm + tissue_moved_mm + touch.axes * pose.move_mm;
+                                 const GesturePose& pose, const Vec3& met_mm, const Vec3& carried_mm) {
+  const Vec3 at_tissue = touch.point_mm + met_mm + touch.axes * pose.move_mm;
   InstrumentPlace place;
   place.axis = (at_tissue - instrument.enters_from).normalized();
   place.tip_mm = at_tissue - pose.away * instrument.free_distance_mm * place.axis;
   place.opening = pose.opening;
-  if (breath_mm != Vec3::Zero()) {
-    place.tip_mm += breath_mm;
+  if (carried_mm != Vec3::Zero()) {
+    place.tip_mm += carried_mm;
     place.axis = (place.tip_mm - instrument.enters_from).normalized();
   }
   return place;
@@ -70,15 +73,6 @@ class HeldTissue {
     return equilibrium;
   }
 
-  /// By how much a patch is moved in a state.
-  Vec3 moved_mm(size_t tip, const Eigen::VectorXd& u) const {
-    Vec3 mean = Vec3::Zero();
-    const auto& samples = body_.patches[tip].footprint.samples;
-    for (const Footprint::Sample& sample : samples)
-      mean += u.segment<3>(3 * sample.nodes[0]) / static_cast<double>(samples.size());
-    return mean;
-  }
-
  private:
   const TruthBody& body_;
   EquilibriumSolver solver_;
@@ -86,18 +80,66 @@ class HeldTissue {
   std::vector<Vec3> displacements_mm_;
 };
 
-/// The second instrument goes where the first has moved the tissue, until it takes hold itself.
-struct SecondTip {
-  Vec3 tissue_moved_mm = Vec3::Zero();
-  bool took_hold = false;
+/// The tissue as it moves by itself, without instruments. Sets the base of the model that the equilibria are of.
+class FreeTissue {
+ public:
+  FreeTissue(TetModel& model, const SimulateOptions& options, const TruthBody& body)
+      : model_(model), options_(options), body_(body) {}
+
+  void at(double time_s) {
+    organ_mm_ = organ_motion_mm(options_, time_s);
+    if (options_.stretch.strain == Vec3::Zero()) return;
+    u_ = stretch_free_tissue(model_, attachment_strain(options_.stretch, time_s), options_.body.center_mm);
+  }
+  const Vec3& organ_mm() const { return organ_mm_; }
+  /// Empty = at rest.
+  const Eigen::VectorXd& u() const { return u_; }
+  /// By how much the tissue beneath a tip has moved.
+  Vec3 moved_mm(size_t tip) const {
+    return u_.size() == 0 ? organ_mm_ : organ_mm_ + patch_moved_mm(body_.patches[tip], u_);
+  }
+
+ private:
+  TetModel& model_;
+  const SimulateOptions& options_;
+  const TruthBody& body_;
+  Vec3 organ_mm_ = Vec3::Zero();
+  Eigen::VectorXd u_;
 };
 
-void fill_row(TruthRow& row, int field, int fields, double fps, const SimulatedCamera& camera, const Vec3& tip_mm) {
+/// One instrument at work.
+struct Hand {
+  const SimulatedInstrument& instrument;
+  const std::vector<GestureRow>& gesture;
+  TouchPoint touch;
+  bool stands = false;            // while the tissue moves by itself
+  Vec3 met_mm = Vec3::Zero();     // by how much the tissue has moved by itself when it is touched
+  Vec3 pulled_mm = Vec3::Zero();  // by how much another instrument has moved the tissue when it is touched
+  bool took_hold = false;
+
+  /// `tissue_moved_mm`: by itself, as all that follows.
+  InstrumentPlace place(const GesturePose& pose, const Vec3& tissue_moved_mm) const {
+    return stands ? place_instrument(instrument, touch, pose, pulled_mm + met_mm, Vec3::Zero())
+                  : place_instrument(instrument, touch, pose, pulled_mm, tissue_moved_mm);
+  }
+  /// Of the tip from where the tissue that it touched would be by itself.
+  Vec3 displacement_mm(const GesturePose& pose, const Vec3& tissue_moved_mm) const {
+    Vec3 displacement_mm = touch.axes * pose.move_mm;
+    if (stands) displacement_mm += met_mm - tissue_moved_mm;
+    if (pose.in_contact) return displacement_mm;
+    return displacement_mm - pose.away * instrument.free_distance_mm * place(pose, tissue_moved_mm).axis;
+  }
+};
+
+void fill_row(TruthRow& row, const SimulateOptions& options, int field, int fields, InstrumentPlace& place) {
+  const SimulatedCamera& camera = options.camera;
   row.frame = field / fields;
-  row.time_s = field / (fields * fps);
-  row.tip_mm = tip_mm;
-  row.visible = tip_mm.z() > 0 && inside(camera, project(camera, tip_mm, 0)) &&
-                inside(camera, project(camera, tip_mm, camera.baseline_mm));
+  row.time_s = field / (fields * camera.fps);
+  place.tip_mm -= camera_motion_mm(camera.pan, row.time_s);
+  row.tip_mm = place.tip_mm;
+  row.visible = row.tip_mm.z() > 0 && inside(camera, project(camera, row.tip_mm, 0)) &&
+                inside(camera, project(camera, row.tip_mm, camera.baseline_mm)) &&
+                !is_obscured(options.obscured, row.time_s);
 }
 
 // The touch point on the boundary of the true body: the drawn organ is finer, and may lie above it or below.
@@ -154,56 +196,67 @@ double motion_duration_s(const SimulateOptions& options) {
 std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
                                  const std::vector<TouchPoint>& touches, double friction, int frames,
                                  MotionQuality& quality, const std::function<void()>& step) {
-  const TetModel model(truth.mesh, tissue, truth.fixed_nodes, Element::averaged);
+  TetModel model(truth.mesh, tissue, truth.fixed_nodes, Element::averaged);
   EquilibriumOptions precise;
   precise.relative_residual = kTruthResidual;
-  const TouchPoint& touch = touches.at(0);
+  FreeTissue free(model, options, truth);
+  const bool drifts = moves_beneath_hand(options);
+  std::vector<Hand> hands{{options.instrument, options.gesture, touches.at(0)}};
+  if (options.second.present) hands.push_back({options.second.instrument, options.second.gesture, touches.at(1)});
+  for (size_t tip = 0; tip < hands.size() && drifts; ++tip) {
+    free.at(touch_time_s(hands[tip].gesture));
+    hands[tip].stands = true;
+    hands[tip].met_mm = free.moved_mm(tip);
+  }
+  const double touch_s = touch_time_s(options.gesture);
+  const bool push = is_push(options.gesture), alone = !options.second.present;
   HeldTissue grasped(model, truth, precise);
-  PushedTissue pushed(model, truth, on_body(truth, touch), friction, precise);
-  const bool push = is_push(options.gesture);
+  PushedTissue pushed(model, truth, on_body(truth, touches[0]), friction, precise);
   const int fields = options.look.interlace ? 2 : 1;
-  SecondTip second;
   std::vector<Moment> moments;
   for (int field = 0; field < fields * frames; ++field) {
     const double time_s = field / (fields * options.camera.fps);
+    free.at(time_s);
     Moment moment;
-    moment.breath_mm = breath_mm(options.breathing, time_s);
+    moment.scene_mm = free.organ_mm() - camera_motion_mm(options.camera.pan, time_s);
+    moment.u = free.u();
     const GesturePose pose = gesture_at(options.gesture, time_s);
-    moment.place = place_instrument(options.instrument, touch, pose, Vec3::Zero(), moment.breath_mm);
-    fill_row(moment.truth, field, fields, options.camera.fps, options.camera, moment.place.tip_mm);
-    const Vec3 move_mm = touch.axes * pose.move_mm;
-    const auto hold = [&grasped](size_t tip, bool holds, const Vec3& displacement_mm) {
+    const Vec3 displacement_mm = hands[0].displacement_mm(pose, free.moved_mm(0));
+    moment.place = hands[0].place(pose, free.moved_mm(0));
+    fill_row(moment.truth, options, field, fields, moment.place);
+    const auto hold = [&grasped](size_t tip, bool holds, const Vec3& to_mm) {
       if (holds)
-        grasped.move(tip, displacement_mm);
+        grasped.move(tip, to_mm);
       else
         grasped.leave(tip);
     };
+    const bool holds = !push && pose.in_contact;
+    const bool presses = (push && pose.in_contact) || (drifts && alone && !holds && time_s > touch_s);
+    hold(0, holds, displacement_mm);
     std::optional<Equilibrium> equilibrium;
-    if (push && pose.in_contact) {
-      if (PushedTissue::Answer answer = pushed.move(move_mm); answer.touching)
+    if (presses) {
+      if (PushedTissue::Answer answer = pushed.move(displacement_mm); answer.touching)
         equilibrium = std::move(answer.equilibrium);
-      moment.truth.in_contact = equilibrium.has_value();
       if (equilibrium) moment.truth.force_N = equilibrium->force_N;
     } else {
       pushed.leave();
-      hold(0, !push && pose.in_contact, move_mm);
-      moment.truth.in_contact = grasped.holds(0);
     }
-    if (options.second.present) {
+    moment.truth.in_contact = equilibrium || grasped.holds(0);
+    if (!alone) {
+      Hand& second = hands[1];
       const GesturePose other = gesture_at(options.second.gesture, time_s);
       if (!other.in_contact && !second.took_hold && grasped.holds(0))
-        second.tissue_moved_mm = grasped.moved_mm(1, grasped.solve().u);
+        second.pulled_mm = free.organ_mm() + patch_moved_mm(truth.patches[1], grasped.solve().u) - free.moved_mm(1);
       second.took_hold |= other.in_contact;
-      hold(1, other.in_contact, touches.at(1).axes * other.move_mm);
-      moment.second_place =
-          place_instrument(options.second.instrument, touches.at(1), other, second.tissue_moved_mm, moment.breath_mm);
-      fill_row(moment.second_truth, field, fields, options.camera.fps, options.camera, moment.second_place.tip_mm);
+      hold(1, other.in_contact, second.displacement_mm(other, free.moved_mm(1)));
+      moment.second_place = second.place(other, free.moved_mm(1));
+      fill_row(moment.second_truth, options, field, fields, moment.second_place);
       moment.second_truth.in_contact = grasped.holds(1);
     }
-    if (!push && (moment.truth.in_contact || moment.second_truth.in_contact)) {
+    if (grasped.holds(0) || moment.second_truth.in_contact) {
       equilibrium = grasped.solve();
       moment.truth.force_N = equilibrium->contacts[0].force_N;
-      if (options.second.present) moment.second_truth.force_N = equilibrium->contacts[1].force_N;
+      if (!alone) moment.second_truth.force_N = equilibrium->contacts[1].force_N;
     }
     if (equilibrium) {
       check_equilibrium(*equilibrium, time_s, pose.move_mm, quality);

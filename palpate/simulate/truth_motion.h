@@ -24,10 +24,10 @@ TouchPoint find_touch_point(const Surface& organ, const SimulatedCamera& camera,
 struct Moment {
   TruthRow truth;
   InstrumentPlace place;
-  Vec3 breath_mm = Vec3::Zero();  ///< by which the whole scene is displaced
-  TruthRow second_truth;          ///< of a second instrument, where there is one
+  Vec3 scene_mm = Vec3::Zero();  ///< by which organ and background are displaced, left camera frame of this moment
+  TruthRow second_truth;         ///< of a second instrument, where there is one
   InstrumentPlace second_place;
-  Eigen::VectorXd u;  ///< of the true nodes, mm, without breathing; empty = at rest
+  Eigen::VectorXd u;  ///< of the true nodes, mm, without scene_mm; empty = at rest
 };
 
 /// What the equilibria of a sequence have in common.
@@ -41,7 +41,10 @@ double motion_duration_s(const SimulateOptions& options);
 
 /// The moments of `frames` frames, or of twice as many fields when the pictures are interlaced (field 2 k belongs to
 /// frame k, field 2 k + 1 is half a frame later). `touches`: one for each instrument. `friction` is that of a push.
-/// `step` is called after every moment. Throws BadInput when the tissue finds no equilibrium.
+/// Everything is in the frame of the left camera of that moment. Where the tissue moves by itself beneath a hand that
+/// stands, the tip touches it where it is at that time, and what the tissue has moved since then loads it; a tip that
+/// has let go and is still below the surface presses until it has left. `step` is called after every moment. Throws
+/// BadInput when the tissue finds no equilibrium.
 std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOptions& tissue, const TruthBody& truth,
                                  const std::vector<TouchPoint>& touches, double friction, int frames,
                                  MotionQuality& quality, const std::function<void()>& step);

@@ -213,7 +213,7 @@ TEST(DejaVuPush, IsInContactOnlyWhileItPressesAndLooksTheSameInTheFilesForAnyNum
     {release: true, leave_s: 0.2}])");
   demo.simulate.look.smoke.density = 0.2;
   demo.simulate.look.interlace = true;
-  demo.simulate.breathing = {{0, 2, 1}, 2};
+  demo.simulate.breathing = {{0, 2, 1}, 2, SimulatedBreathing::Instrument::follows};
   demo.simulate.write.surface = demo.simulate.write.depth = true;
   demo.simulate.write.grip = SimulatedFiles::Grip::automatic;
   const auto folder = std::filesystem::path(::testing::TempDir()) / ("palpate_push_" + std::to_string(getpid()));

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
 #include "palpate/contact/equilibrium.h"
 #include "palpate/core/errors.h"
 #include "palpate/simulate/organ_shape.h"
@@ -42,6 +46,59 @@ TEST_F(TruthBodyTest, TiesOnlyFreeSurfaceNodesNearTheContact) {
     EXPECT_EQ(sample.barycentric, Vec3::UnitX());
   }
   EXPECT_NEAR(body.patches[0].radius_mm, 4, 0.8);
+}
+
+// Mean square distance of what is held along the long axis, across it, and from the nearest node to the middle, mm.
+TEST_F(TruthBodyTest, HoldsTheShapeThatIsAskedFor) {
+  using Patch = SimulatedTruth::Patch;
+  const Vec3 along = normal.unitOrthogonal(), across = normal.cross(along);
+  struct Extent {
+    double along_mm, across_mm, nearest_mm;
+  };
+  const auto extent = [&](Patch shape) {
+    const TruthBody held = make_truth_body(organ, 6000, demo.attachments, [](const Vec3&) { return cv::Point2d(); },
+                                           {{touch, normal, 4, 0, shape, along}});
+    EXPECT_NEAR(held.patches[0].radius_mm, 4, 0.8);
+    EXPECT_EQ(held.patches[0].footprint.means.rows(), shape == Patch::soft_rim ? 1 : 0);
+    Extent found{0, 0, 100};
+    const auto& samples = held.patches[0].footprint.samples;
+    for (const auto& sample : samples) {
+      const Vec3 offset = held.mesh.nodes_mm[static_cast<size_t>(sample.nodes[0])] - touch;
+      found.along_mm += std::pow(offset.dot(along), 2) / static_cast<double>(samples.size());
+      found.across_mm += std::pow(offset.dot(across), 2) / static_cast<double>(samples.size());
+      found.nearest_mm = std::min(found.nearest_mm, (offset - offset.dot(normal) * normal).norm());
+    }
+    return Extent{std::sqrt(found.along_mm), std::sqrt(found.across_mm), found.nearest_mm};
+  };
+  const Extent disc = extent(Patch::disc), ellipse = extent(Patch::ellipse), jaws = extent(Patch::two_jaws),
+               soft = extent(Patch::soft_rim);
+  EXPECT_NEAR(disc.along_mm / disc.across_mm, 1, 0.25);
+  EXPECT_NEAR(ellipse.along_mm / ellipse.across_mm, 2, 0.4);
+  EXPECT_GT(jaws.along_mm / jaws.across_mm, 2);
+  EXPECT_GT(jaws.nearest_mm, 0.15 * 4);  // nothing between them
+  EXPECT_GT(soft.along_mm, 1.1 * disc.along_mm);
+}
+
+TEST_F(TruthBodyTest, TakesAMeanThatFadesAsMovedWithThePatch) {
+  const TruthBody soft =
+      make_truth_body(organ, 3000, demo.attachments, [](const Vec3&) { return cv::Point2d(); },
+                      {{touch, normal, 4, 0, SimulatedTruth::Patch::soft_rim, normal.unitOrthogonal()}});
+  const TetModel model(soft.mesh, demo.tissue, soft.fixed_nodes);
+  EquilibriumSolver solver(model, {.relative_residual = 1e-8});
+  solver.hold(soft.patches[0].footprint);
+  const Vec3 pull = 1.2 * normal;
+  const Equilibrium held = solver.solve(pull);
+  ASSERT_TRUE(held.converged);
+  EXPECT_LT((patch_moved_mm(soft.patches[0], held.u) - pull).norm(), 1e-9);
+  // The middle gives more than the rim of what is held only in the mean.
+  double farthest = 0, nearest = 10;
+  for (const auto& sample : soft.patches[0].footprint.samples) {
+    const double moved = held.u.segment<3>(3 * sample.nodes[0]).dot(normal);
+    farthest = std::max(farthest, moved);
+    nearest = std::min(nearest, moved);
+  }
+  EXPECT_GT(farthest, 1.2);
+  EXPECT_LT(nearest, 1.1);
 }
 
 TEST_F(TruthBodyTest, RefusesAContactOnAttachedTissue) {
