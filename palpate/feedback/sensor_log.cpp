@@ -22,6 +22,7 @@ namespace {
 constexpr size_t kFewestReadings = 10;
 /// The delay is searched in steps of the coarse one everywhere, around the best of those in steps of the fine one.
 constexpr double kCoarseStep_s = 0.02, kFineStep_s = 0.005;
+constexpr int kFineSteps = 6;
 /// Of the frames, as many have to lie within the sensor's time.
 constexpr double kLeastOverlap = 0.5;
 /// Below, the log shows something else than the video.
@@ -129,13 +130,14 @@ double correlation_of(const Pairs& pairs) {
 double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor) {
   double best = 0, best_correlation = -2;
   for (const double around_s : likely_delays_s(estimate, sensor, kLeastOverlap, kCoarseStep_s))
-    for (double offset_s = -kCoarseStep_s; offset_s <= kCoarseStep_s; offset_s += kFineStep_s) {
-      const Pairs pairs = pairs_at(estimate, sensor, around_s + offset_s);
+    for (int step = -kFineSteps; step <= kFineSteps; ++step) {
+      const double delay_s = around_s + step * kFineStep_s;
+      const Pairs pairs = pairs_at(estimate, sensor, delay_s);
       if (static_cast<double>(pairs.estimate_N.size()) < kLeastOverlap * static_cast<double>(estimate.size())) continue;
       const double correlation = correlation_of(pairs);
       if (correlation <= best_correlation) continue;
       best_correlation = correlation;
-      best = around_s + offset_s;
+      best = delay_s;
     }
   if (best_correlation <= -2)
     throw BadInput("the sensor's log and the estimate overlap by less than half of the video at any delay");

@@ -73,9 +73,9 @@ void orient(Surface& surface) {
   }
 }
 
-/// Corners nearer to each other than this part of the mesh's extent are one: what programs round off when they write a
-/// corner once for each of its triangles.
-constexpr double kSameCorner = 1e-6;
+/// Corners nearer to each other than this part of the mesh's extent, or of its distance from the origin, are one: the
+/// last of the seven digits that programs write, when they write a corner once for each of its triangles.
+constexpr double kSameCorner = 3e-6;
 
 /// Numbers of the vertices after those within reach of an earlier one became it.
 class Corners {
@@ -86,7 +86,8 @@ class Corners {
       low = low.cwiseMin(v);
       high = high.cwiseMax(v);
     }
-    reach_ = vertices.empty() ? 0 : kSameCorner * (high - low).norm();
+    if (vertices.empty()) return;
+    reach_ = kSameCorner * std::max((high - low).norm(), high.cwiseAbs().cwiseMax(low.cwiseAbs()).maxCoeff());
     origin_ = low;
   }
 

@@ -17,7 +17,7 @@ enum class LengthUnit { mm, m };
 Surface close_body(const Surface& visible, double thickness_mm);
 
 /// A closed surface or a volume from a scan, in the left camera frame: .msh (Gmsh) .vtk .vtu .vtp .obj .ply .stl as
-/// docs/inputs.md says; of a volume its boundary is taken. Corners nearer than a millionth of the body's extent are
+/// docs/inputs.md says; of a volume its boundary is taken. Corners nearer than three millionths of its extent are
 /// one. Oriented outwards (cavities, if the file orients them, stay cavities). Throws BadInput: unreadable, empty, open
 /// surface (with the number of its holes).
 Surface read_body(const std::filesystem::path& file, LengthUnit unit);

@@ -114,7 +114,9 @@ std::vector<InputKind> mesh_kinds() {
       {"cells", "",
        "tetrahedra, hexahedra, voxels, wedges, pyramids (their boundary is taken), else triangles, quadrilaterals, "
        "polygons, strips; of a higher order the corners; inverted tetrahedra are turned; polyhedra are refused"});
-  kinds.push_back({"corners", "", "those nearer than a millionth of the mesh's extent are one"});
+  kinds.push_back(
+      {"corners", "",
+       "those nearer than three millionths of the mesh's extent, or of its distance from the origin, are one"});
   return kinds;
 }
 
