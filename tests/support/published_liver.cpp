@@ -24,8 +24,9 @@ std::vector<int> read_numbers(const std::filesystem::path& file) {
 }
 
 TetMesh read_mesh(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  const CellSoup soup = read_gmsh(stream);
+  std::ifstream stream(file, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  const CellSoup soup = read_gmsh(bytes);
   TetMesh mesh;
   for (const Vec3& x : soup.points) mesh.nodes_mm.push_back(kMillimetresPerMetre * x);
   for (size_t c = 0; c < soup.cells.size(); ++c)
