@@ -86,7 +86,9 @@ bool LineSplitter::next(std::vector<std::string_view>& fields) {
   for (; at_ < text_.size(); ++at_) {
     const char c = text_[at_];
     if (c == '\n') ++next_line_;
-    if (c == '"' && (quoted || trimmed(text_.substr(begin, at_ - begin)).empty())) {
+    if (c == '"' && quoted && at_ + 1 < text_.size() && text_[at_ + 1] == '"') {
+      ++at_;  // a quote within quotes stands twice
+    } else if (c == '"' && (quoted || trimmed(text_.substr(begin, at_ - begin)).empty())) {
       quoted = !quoted;
     } else if (quoted) {
       continue;

@@ -13,6 +13,9 @@ namespace {
 
 /// No hypothesis is ever ruled out for good.
 constexpr double kMinProbability = 1e-6;
+/// A tip at the place that it held, and that looks free, holds it again at this rate: tissue that rests as yet says
+/// little against it.
+constexpr double kHoldAgain_per_s = 10;
 /// Coulomb's coefficient is known to a factor, not to a figure.
 constexpr double kFrictionDeviationRatio = 0.5;
 
@@ -63,7 +66,7 @@ void HoldFilter::predict(double seconds, const InferenceParameters& parameters) 
     at(next, Hold::free) += released * at(probability_, hold);
     at(next, hold) -= released * at(probability_, hold);
   }
-  const double touched = changed(parameters.touch_per_s) * probability(Hold::free);
+  const double touched = changed(kHoldAgain_per_s) * probability(Hold::free);
   at(next, Hold::free) -= touched;
   if (grip_ != Grip::push) at(next, Hold::grasp) += grip_ == Grip::grasp ? touched : 0.5 * touched;
   if (grip_ != Grip::grasp) at(next, Hold::push) += grip_ == Grip::push ? touched : 0.5 * touched;

@@ -36,9 +36,9 @@ TEST(ContactModel, TheDerivativesByDisplacementAreThoseOfItsAnswers) {
     const Equilibrium more = model.solve({q + kStep_mm * Vec3::Unit(axis)}),
                       less = model.solve({q - kStep_mm * Vec3::Unit(axis)});
     const Vec3 per_mm = (more.force_N - less.force_N) / (2 * kStep_mm);
-    EXPECT_LT((per_mm - response.force.col(axis)).norm(), 0.06 * per_mm.norm()) << axis;
+    EXPECT_LT((per_mm - response.force.col(axis)).norm(), 0.08 * per_mm.norm()) << axis;
     const Eigen::VectorXd motion = (more.u - less.u) / (2 * kStep_mm);
-    EXPECT_LT((motion - response.motion.col(axis)).norm(), 0.06 * motion.norm()) << axis;
+    EXPECT_LT((motion - response.motion.col(axis)).norm(), 0.08 * motion.norm()) << axis;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 namespace palpate {
@@ -43,26 +44,32 @@ RectifiedPair plane(const Vec3& motion_px, double gain = 1) {
   return pair;
 }
 
+/// Nine of ten points are nearer to the motion than this, px.
+double ninth_decile_px(const std::vector<TissuePoint>& seen, const Vec3& motion_px) {
+  std::vector<double> errors_px;
+  for (const TissuePoint& point : seen) errors_px.push_back((point.motion_px - motion_px).norm());
+  std::sort(errors_px.begin(), errors_px.end());
+  return errors_px.at(errors_px.size() * 9 / 10);
+}
+
 class TissueTracking : public testing::Test {
  protected:
   TissueTracker tracker_{plane(Vec3::Zero()), straight_rig(), cv::Mat(240, 320, CV_32F, cv::Scalar(kDisparity_px)),
                          cv::Mat(240, 320, CV_8U, 255)};
 };
 
-TEST_F(TissueTracking, FindsTheMotionOfEveryPointToATenthOfAPixel) {
+TEST_F(TissueTracking, FindsTheMotionOfThePointsToAFractionOfAPixel) {
   ASSERT_GT(tracker_.points().size(), 100u);
   const Vec3 motion_px(2.3, -1.7, 0.6);
   const auto seen = tracker_.update(plane(motion_px), {}, {}, tracker_.points());
   ASSERT_GT(seen.size(), 0.7 * static_cast<double>(tracker_.points().size()));
-  Vec3 mean = Vec3::Zero();
-  for (const TissuePoint& point : seen) mean += point.motion_px / static_cast<double>(seen.size());
-  EXPECT_NEAR((mean - motion_px).norm(), 0, 0.05);
+  EXPECT_LT(ninth_decile_px(seen, motion_px), 0.3);
 }
 
 TEST_F(TissueTracking, DoesNotMistakeAnotherExposureForMotion) {
   const auto seen = tracker_.update(plane(Vec3::Zero(), 0.75), {}, {}, tracker_.points());
   ASSERT_GT(seen.size(), 0.7 * static_cast<double>(tracker_.points().size()));
-  for (const TissuePoint& point : seen) EXPECT_LT(point.motion_px.norm(), 0.2) << point.number;
+  EXPECT_LT(ninth_decile_px(seen, Vec3::Zero()), 0.2);
 }
 
 TEST_F(TissueTracking, FindsALongWayOnlyFromWhereItIsExpected) {
@@ -71,7 +78,7 @@ TEST_F(TissueTracking, FindsALongWayOnlyFromWhereItIsExpected) {
   for (TissuePoint& point : expected) point.motion_px = motion_px + Vec3(1, -1, 0.5);
   const auto seen = tracker_.update(plane(motion_px), {}, {}, expected);
   ASSERT_GT(seen.size(), 0.4 * static_cast<double>(expected.size()));
-  for (const TissuePoint& point : seen) EXPECT_LT((point.motion_px - motion_px).norm(), 0.5) << point.number;
+  EXPECT_LT(ninth_decile_px(seen, motion_px), 0.5);
 }
 
 TEST_F(TissueTracking, SeesNoPointUnderAnInstrument) {
