@@ -89,7 +89,8 @@ struct Recording::Sources {
   int frame_count = -1;
   int index = 0;
   StampPairing pairing;
-  std::optional<FrameSource::Frame> right;  // the next one that is not yet used
+  std::optional<FrameSource::Frame> right;  // read and not used yet
+  bool right_has_ended = false;
   double first_stamp_s = 0;
   std::vector<std::string> notes;
 
@@ -112,10 +113,14 @@ struct Recording::Sources {
     const int partner = pairing.right_of_left[static_cast<size_t>(after - lefts.begin())];
     if (partner < 0) return {};
     const double wanted_s = rights[static_cast<size_t>(partner)];
-    while (right && right->time_s < wanted_s - kSameStamp_s) right = second->next();
+    // Not read ahead: a right image that does not open ends the recording only when it is its turn.
+    while (!right_has_ended && (!right || right->time_s < wanted_s - kSameStamp_s)) {
+      right = second->next();
+      right_has_ended = !right.has_value();
+    }
     if (!right || right->time_s > wanted_s + kSameStamp_s) return {};
     const cv::Mat image = right->image;
-    right = second->next();
+    right.reset();
     return image;
   }
 
@@ -211,7 +216,7 @@ std::optional<StereoFrame> Recording::next() {
   std::optional<FrameSource::Frame> second;
   if (s.second && s.is_live()) second = s.second->next();
   const bool ended = !first || (s.second && s.is_live() && !second);
-  const bool right_is_cut = s.second && !s.is_live() && !s.right && s.second->frames_if_whole() > 0;
+  const bool right_is_cut = s.second && !s.is_live() && s.right_has_ended && s.second->frames_if_whole() > 0;
   if (ended || right_is_cut) {
     const FrameSource& source = ended ? *s.first : *s.second;
     if (const int whole = source.frames_if_whole(); whole > 0)
