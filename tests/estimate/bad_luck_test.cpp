@@ -43,8 +43,8 @@ class BadLuck : public testing::Test {
 
   ForceEstimator estimator(int static_frame = 0) const {
     const Scene& scene = sequence_->scene;
-    return ForceEstimator(sequence_->map, frame(static_frame), sequence_->rectification,
-                          scene.instrument, scene.contact);
+    return ForceEstimator(sequence_->map, frame(static_frame), sequence_->rectification, scene.instrument,
+                          scene.contact);
   }
 
   /// Answers to every frame after `spoil` did its work; a frame for which it says false is dropped.

@@ -25,9 +25,7 @@ struct Sequence {
         rest(*recording.next()),
         map(build_tissue_map(rest, rectification, scene.map, scene.tissue, scene.attachments)) {}
 
-  ForceEstimator estimator() const {
-    return ForceEstimator(map, rest, rectification, scene.instrument, scene.contact);
-  }
+  ForceEstimator estimator() const { return ForceEstimator(map, rest, rectification, scene.instrument, scene.contact); }
 };
 
 TEST(TissueMap, FollowsTheTrueSurfaceOfTheRenderedOrgans) {

@@ -135,7 +135,9 @@ TEST(Breathing, PressesATipThatHasLetGoAndIsStillBelowTheSurface) {
   const auto moments = small.solve(10, 18);
   for (const Moment& moment : moments) {
     if (moment.truth.time_s < 1.25) continue;
-    if (moment.truth.in_contact) EXPECT_LT(moment.truth.force_N.dot(small.touch.axes.col(0)), 0);
+    if (moment.truth.in_contact) {
+      EXPECT_LT(moment.truth.force_N.dot(small.touch.axes.col(0)), 0);
+    }
     pressed += moment.truth.in_contact;
   }
   EXPECT_GE(pressed, 1);
