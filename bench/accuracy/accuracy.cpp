@@ -144,10 +144,6 @@ void run_check(const Arguments& arguments, const Check& check, const std::string
   const std::string name = check.name + "/" + sequence;
   const Goal goal = goal_of(check, sequence);
   try {
-    if (!knows_drives()) {
-      print_row(name, "-", goal, measure_seeds(arguments, check, sequence, "as it is"), std::nullopt);
-      return;
-    }
     const Row tip = measure_seeds(arguments, check, sequence, "tip");
     print_row(name, "fused", goal, measure_seeds(arguments, check, sequence, "fused"), tip);
     print_row(name, "tip", goal, tip, std::nullopt);

@@ -58,18 +58,6 @@ std::optional<Measured> measure(const Sequence& sequence, const std::vector<Scen
   return std::nullopt;
 }
 
-bool knows_drives() {
-  app::SceneFile scene_file;
-  Settings settings;
-  app::describe(settings, scene_file);
-  try {
-    read_settings(YAML::Load("contact: {drive: tip}"), {"scene.yaml", "."}, settings);
-    return true;
-  } catch (const BadInput&) {
-    return false;
-  }
-}
-
 double false_force_pct(const Comparison& figures) {
   return figures.true_peak_N > 0 ? 100 * figures.false_force_max_N / figures.true_peak_N : 0;
 }

@@ -30,9 +30,6 @@ struct Measured {
 std::optional<Measured> measure(const Sequence& sequence, const std::vector<SceneChange>& changes,
                                 const std::filesystem::path& folder);
 
-/// Whether this program knows `contact.drive`, so that the paper's method can be set beside the inference.
-bool knows_drives();
-
 /// False contact force in % of the peak.
 double false_force_pct(const Comparison& figures);
 
