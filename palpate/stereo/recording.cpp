@@ -90,7 +90,7 @@ struct Recording::Sources {
   int index = 0;
   StampPairing pairing;
   std::optional<FrameSource::Frame> right;  // read and not used yet
-  bool right_has_ended = false;
+  size_t right_images_read = 0;
   double first_stamp_s = 0;
   std::vector<std::string> notes;
 
@@ -105,6 +105,13 @@ struct Recording::Sources {
 
   bool is_live() const { return first->stamps_s().empty() || (second && second->stamps_s().empty()); }
 
+  void read_right() {
+    right = second->next();
+    right_images_read = right ? right_images_read + 1 : second->stamps_s().size();
+  }
+  /// Every image of the right source was read.
+  bool right_has_ended() const { return right_images_read >= second->stamps_s().size(); }
+
   /// The right image of the moment of a left one; empty where there is none.
   cv::Mat right_image_at(double left_stamp_s) {
     const std::vector<double>&lefts = first->stamps_s(), &rights = second->stamps_s();
@@ -114,11 +121,8 @@ struct Recording::Sources {
     if (partner < 0) return {};
     const double wanted_s = rights[static_cast<size_t>(partner)];
     // Not read ahead: a right image that does not open ends the recording only when it is its turn.
-    while (!right_has_ended && (!right || right->time_s < wanted_s - kSameStamp_s)) {
-      right = second->next();
-      right_has_ended = !right.has_value();
-    }
-    if (!right || right->time_s > wanted_s + kSameStamp_s) return {};
+    while (!right_has_ended() && (!right || right->time_s < wanted_s - kSameStamp_s)) read_right();
+    if (!right || std::abs(right->time_s - wanted_s) > kSameStamp_s) return {};
     const cv::Mat image = right->image;
     right.reset();
     return image;
@@ -195,7 +199,7 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
           fmt::format("recording: no frame of {} is of the time of one of {}, expected both to show the same "
                       "moments",
                       options.left.string(), options.right.string()));
-    s.right = s.second->next();
+    s.read_right();
   }
   const int held = static_cast<int>(stamps.size()), whole = s.first->frames_if_whole();
   s.frame_count = stamps.empty() ? -1 : std::max(held, whole);
@@ -216,7 +220,8 @@ std::optional<StereoFrame> Recording::next() {
   std::optional<FrameSource::Frame> second;
   if (s.second && s.is_live()) second = s.second->next();
   const bool ended = !first || (s.second && s.is_live() && !second);
-  const bool right_is_cut = s.second && !s.is_live() && s.right_has_ended && s.second->frames_if_whole() > 0;
+  const bool right_is_cut =
+      s.second && !s.is_live() && !s.right && s.right_has_ended() && s.second->frames_if_whole() > 0;
   if (ended || right_is_cut) {
     const FrameSource& source = ended ? *s.first : *s.second;
     if (const int whole = source.frames_if_whole(); whole > 0)
