@@ -389,8 +389,6 @@ struct ForceFilter::State {
     answer.footprint_mm = std::exp(fit.posterior.log_radius(k));
     answer.tip_inferred = !tip.visible;
     answer.tip_mm = scene.apply(model.footprint(k).center_mm + fit.posterior.q_mm(k));
-    if (tip.visible)
-      answer.tip_mm = scene.apply(model.footprint(k).center_mm + fit.posterior.q_mm(k) + fit.posterior.offset_mm(k));
     answer.near_attachment = model.distance_to_attachments_mm(k) < 2 * options.footprint_radius_mm;
   }
 
