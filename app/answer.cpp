@@ -24,9 +24,11 @@ std::string json_failure(const std::string& sentence, int exit_code) {
 }
 
 nlohmann::ordered_json tissue_json(const TissueOptions& tissue) {
-  return {{"law", law_name(tissue.law)},
-          {"young_modulus_kPa", tissue.young_modulus_kPa},
-          {"poisson_ratio", tissue.poisson_ratio}};
+  nlohmann::ordered_json json = {{"law", law_name(tissue.law)},
+                                 {"young_modulus_kPa", tissue.young_modulus_kPa},
+                                 {"poisson_ratio", tissue.poisson_ratio}};
+  if (tissue.modulus_unknown) json["young_modulus_kPa"] = "unknown";
+  return json;
 }
 
 }  // namespace palpate::app

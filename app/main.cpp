@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   app::add_estimate(program);
   app::add_compare(program);
   app::add_check(program);
+  app::add_modulus(program);
   app::add_study(program);
   app::add_later_verbs(program);
 

@@ -49,7 +49,9 @@ auto in_scene(const SceneFile& scene_file, const std::string& key, const Stage& 
   } catch (const BadInput& error) {
     const std::string sentence = error.what();
     const auto names = [&sentence](const char* group) { return sentence.starts_with(group); };
-    const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument");
+    const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument") ||
+                           names("contact.") ||
+                           names("uncertainty");
     const std::filesystem::path& volume = scene_file.scene.map.volume;
     const std::string told = names_key                                                  ? ""
                              : !volume.empty() && sentence.starts_with(volume.string()) ? "map.volume: "
@@ -71,7 +73,7 @@ void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size
 }
 
 std::string run_yaml(SceneFile scene_file, const Rectification& rectification) {
-  scene_file.has_run = true;
+  scene_file.has_run = scene_file.scene.has_tuning = true;
   scene_file.rectified_from_left = rectification.rectified_from_left;
   return fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
 }
@@ -79,11 +81,12 @@ std::string run_yaml(SceneFile scene_file, const Rectification& rectification) {
 /// The frames worth a picture in the report: spread over the contact, or over the run where there is none.
 class PictureChoice {
  public:
-  PictureChoice(int frames) : every_(std::max(1, frames / (2 * kReportPictures))) {}
+  PictureChoice(int frames, std::string unit)
+      : every_(std::max(1, frames / (2 * kReportPictures))), unit_(std::move(unit)) {}
 
   void offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
     if (estimate.frame % every_ != 0) return;
-    pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate)}});
+    pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate, unit_)}});
   }
 
   std::vector<ReportPicture> chosen() const {
@@ -99,8 +102,8 @@ class PictureChoice {
   }
 
  private:
-  static std::string caption(const ForceEstimate& estimate) {
-    const std::string force = estimate.in_contact ? fmt::format(", {:.2f} N", estimate.force_N.norm()) : "";
+  static std::string caption(const ForceEstimate& estimate, const std::string& unit) {
+    const std::string force = estimate.in_contact ? fmt::format(", {:.3g} {}", estimate.force_N.norm(), unit) : "";
     return fmt::format("frame {}, {:.2f} s, {}{}", estimate.frame, estimate.time_s, status_name(estimate.status),
                        force);
   }
@@ -110,6 +113,7 @@ class PictureChoice {
     ReportPicture picture;
   };
   int every_;
+  std::string unit_;
   std::vector<Offered> pictures_;
 };
 
@@ -142,7 +146,7 @@ struct RunFiles {
         forces_2(o.folder / "forces_2.csv"),
         overlay(o.folder / "overlay.mp4", recording.fps(), recording.size()),
         painter(b.rectification, s.scene.tissue, s.overlay),
-        pictures(recording.frame_count()) {}
+        pictures(recording.frame_count(), force_unit(s.scene.tissue)) {}
 
   void add(const StereoFrame& frame, ForceEstimate estimate) {
     Stopwatch watch;
@@ -237,6 +241,18 @@ double force_per_modulus_N_per_kPa(const RunSummary& summary) {
   return summary.tissue.young_modulus_kPa > 0 ? summary.peak_force_N / summary.tissue.young_modulus_kPa : 0;
 }
 
+ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built) {
+  const Scene& scene = scene_file.scene;
+  ForceUncertainty uncertainty = in_scene(scene_file, "uncertainty", [&] {
+    return force_uncertainty(built.map, built.rectification, scene.map, scene.uncertainty,
+                             scene.contact.footprint_radius_mm);
+  });
+  return in_scene(scene_file, "contact", [&] {
+    return ForceEstimator(built.map, built.frame, built.rectification, scene.instrument, scene.contact, scene.tuning,
+                          std::move(uncertainty));
+  });
+}
+
 }  // namespace
 
 BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
@@ -297,6 +313,20 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
     throw Unfinished(fmt::format("{}: cannot be written", (folder / "preview.png").string()));
 }
 
+std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
+  const BuiltMap built = build_map(scene_file, quiet);
+  ForceEstimator estimator = make_estimator(scene_file, built);
+  Recording recording(scene_file.scene.recording);
+  Progress progress("estimate", quiet);
+  std::vector<ForceRow> rows;
+  while (auto frame = recording.next()) {
+    rows.push_back(to_row(estimator.update(*frame)));
+    progress.show(frame->index + 1, recording.frame_count());
+    if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
+  }
+  return rows;
+}
+
 RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) {
   require_output_folder(options.folder);
   if (!options.truth.empty()) read_truth(options.truth);
@@ -308,7 +338,7 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
 
   const Scene& scene = scene_file.scene;
-  ForceEstimator estimator(built.map, built.frame, built.rectification, scene.instrument, scene.contact, scene.tuning);
+  ForceEstimator estimator = make_estimator(scene_file, built);
   Recording recording(scene.recording);
   std::filesystem::create_directories(options.folder);
   write_map_files(built, options.folder);
@@ -325,7 +355,7 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
       const ForceEstimate estimate = estimator.update(*frame);
       files.add(*frame, estimate);
       progress.show(frame->index + 1, recording.frame_count(),
-                    fmt::format("{} {:.2f} N", status_name(estimate.status), estimate.force_N.norm()));
+                    fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
       if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
     }
   } catch (const Unfinished& reason) {
@@ -348,10 +378,11 @@ std::string to_text(const RunSummary& summary) {
   line("time per frame",
        fmt::format("{:.1f} ms median, {:.1f} ms for 99 %", summary.median_frame_ms, summary.p99_frame_ms));
   const TissueOptions& tissue = summary.tissue;
-  line("tissue assumed", fmt::format("{}, E = {:g} kPa, nu = {:g}", law_name(tissue.law), tissue.young_modulus_kPa,
-                                     tissue.poisson_ratio));
-  line("peak force", fmt::format("{:.2f} N, that is {:.3g} N per kPa of E", summary.peak_force_N,
-                                 force_per_modulus_N_per_kPa(summary)));
+  line("tissue assumed", fmt::format("{}, E {} {}, nu = {:g}", law_name(tissue.law), tissue.modulus_unknown ? "is" : "=",
+                                     modulus_text(tissue), tissue.poisson_ratio));
+  const std::string ratio = fmt::format("{:.3g} N per kPa of E", force_per_modulus_N_per_kPa(summary));
+  line("peak force",
+       tissue.modulus_unknown ? ratio : fmt::format("{:.2f} N, that is {}", summary.peak_force_N, ratio));
   if (summary.frames_by_status.count("tool_lost") && summary.frames_by_status.size() == 1)
     line("instrument", "not seen in any frame");
   for (const auto& [name, frames] : summary.frames_by_warning)

@@ -57,6 +57,9 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
 /// pictures so far on the disk.
 RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options);
 
+/// Both stages of a scene; the rows of forces.csv, nothing is written. Throws BadInput, Unfinished.
+std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet);
+
 /// Lines of name and value.
 std::string to_text(const RunSummary& summary);
 nlohmann::ordered_json to_json(const RunSummary& summary);

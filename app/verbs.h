@@ -23,6 +23,7 @@ void add_map(CLI::App& app);
 void add_estimate(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
+void add_modulus(CLI::App& app);
 void add_study(CLI::App& app);
 void add_later_verbs(CLI::App& app);
 

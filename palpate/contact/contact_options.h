@@ -1,5 +1,8 @@
 #pragma once
 
+#include <opencv2/core.hpp>
+#include <vector>
+
 #include "palpate/core/settings.h"
 
 namespace palpate {
@@ -16,6 +19,9 @@ struct ContactOptions {
   Grip grip = Grip::automatic;
   double friction = 0.3;  ///< Coulomb coefficient of a push
   Drive drive = Drive::fused;
+  /// Where tissue is held when no instrument is looked for, recorded left image; empty or one pixel.
+  std::vector<cv::Point2d> at_px;
+  int at_frame = -1;  ///< from which frame on; -1 = when the tissue says so
 };
 
 void describe(Settings& settings, ContactOptions& options);

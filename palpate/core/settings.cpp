@@ -155,6 +155,23 @@ void Settings::number(const std::string& key, double& field, Range range, const 
   entries_.push_back(std::move(entry));
 }
 
+void Settings::number_or_word(const std::string& key, double& field, Range range, const std::string& word,
+                              bool& is_word, const std::string& doc) {
+  number(key, field, range, doc);
+  Entry& entry = *entries_.back();
+  entry.range = fmt::format("{}, or {}", range.text(), word);
+  entry.read = [&field, &is_word, range, word](const YAML::Node& node, const SettingsContext&,
+                                               const std::string& place, const std::string&) {
+    double value = 0;
+    is_word = node.IsScalar() && node.Scalar() == word;
+    if (is_word) return;
+    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value))
+      throw BadInput(fmt::format("{} is {}, expected a number {}, or {}", place, written(node), range.text(), word));
+    field = number_of(node, place, range);
+  };
+  entry.write = [&field, &is_word, word] { return is_word ? word : shortest(field); };
+}
+
 void Settings::integer(const std::string& key, int& field, Range range, const std::string& doc) {
   auto entry = std::make_unique<Entry>();
   entry->key = key;
@@ -360,6 +377,36 @@ void Settings::choice_by_index(const std::string& key, const std::vector<std::st
   entry->write = [names, get, file] {
     const auto index = static_cast<size_t>(get());
     return index < names.size() ? names[index] : yaml_text(file->string());
+  };
+  entry->default_text = entry->write();
+  entries_.push_back(std::move(entry));
+}
+
+void Settings::choices_by_index(const std::string& key, const std::vector<std::string>& names,
+                                const std::function<std::vector<int>()>& get,
+                                const std::function<void(const std::vector<int>&)>& set, const std::string& doc) {
+  auto entry = std::make_unique<Entry>();
+  entry->key = key;
+  entry->doc = doc;
+  entry->range = fmt::format("[] of: {}", fmt::join(names, ", "));
+  entry->read = [names, set](const YAML::Node& node, const SettingsContext&, const std::string& place,
+                             const std::string&) {
+    if (!node.IsSequence())
+      throw BadInput(fmt::format("{} is {}, expected a list [..] of: {}", place, written(node),
+                                 fmt::join(names, ", ")));
+    std::vector<int> indices;
+    for (const YAML::Node& item : node) {
+      const auto found = std::find(names.begin(), names.end(), item.IsScalar() ? item.Scalar() : "");
+      if (found == names.end())
+        throw BadInput(fmt::format("{} holds {}, expected some of: {}", place, written(item), fmt::join(names, ", ")));
+      indices.push_back(static_cast<int>(found - names.begin()));
+    }
+    set(indices);
+  };
+  entry->write = [names, get] {
+    std::vector<std::string> words;
+    for (int index : get()) words.push_back(names[static_cast<size_t>(index)]);
+    return fmt::format("[{}]", fmt::join(words, ", "));
   };
   entry->default_text = entry->write();
   entries_.push_back(std::move(entry));

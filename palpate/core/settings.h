@@ -48,6 +48,9 @@ class Settings {
   Settings& operator=(Settings&&) noexcept;
 
   void number(const std::string& key, double& field, Range range, const std::string& doc);
+  /// A number, or `word`, which sets `is_word` and leaves the number.
+  void number_or_word(const std::string& key, double& field, Range range, const std::string& word, bool& is_word,
+                      const std::string& doc);
   void integer(const std::string& key, int& field, Range range, const std::string& doc);
   void flag(const std::string& key, bool& field, const std::string& doc);
   void text(const std::string& key, std::string& field, const std::string& doc);
@@ -78,6 +81,28 @@ class Settings {
           return 0;
         },
         [&field, words](int index) { field = words[static_cast<size_t>(index)].second; }, doc);
+  }
+
+  /// Words out of a list, [] for none.
+  template <class Enum>
+  void choices(const std::string& key, std::vector<Enum>& field,
+               const std::vector<std::pair<std::string, Enum>>& words, const std::string& doc) {
+    std::vector<std::string> names;
+    for (const auto& word : words) names.push_back(word.first);
+    choices_by_index(
+        key, names,
+        [&field, words] {
+          std::vector<int> indices;
+          for (const Enum& value : field)
+            for (size_t i = 0; i < words.size(); ++i)
+              if (words[i].second == value) indices.push_back(static_cast<int>(i));
+          return indices;
+        },
+        [&field, words](const std::vector<int>& indices) {
+          field.clear();
+          for (int index : indices) field.push_back(words[static_cast<size_t>(index)].second);
+        },
+        doc);
   }
 
   /// One word out of a list, or a file whose name ends with `extension`, for which `of_file` stands.
@@ -122,6 +147,10 @@ class Settings {
   friend void read_settings(const YAML::Node&, const SettingsContext&, Settings&, const std::string&);
   friend std::string write_settings(const Settings&);
   friend std::string document_settings(const Settings&, const std::string&);
+
+  void choices_by_index(const std::string& key, const std::vector<std::string>& names,
+                        const std::function<std::vector<int>()>& get,
+                        const std::function<void(const std::vector<int>&)>& set, const std::string& doc);
 
   /// The index after the last name stands for `file`, where there is one.
   void choice_by_index(const std::string& key, const std::vector<std::string>& names, const std::function<int()>& get,

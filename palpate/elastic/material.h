@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "palpate/core/geometry.h"
@@ -22,7 +23,8 @@ struct TissueOptions {
   Law law = Law::saint_venant_kirchhoff;
   double young_modulus_kPa = 0;
   double poisson_ratio = 0.45;
-  std::string preset;  ///< liver, uterus, ...; fills the two numbers above where they are not given
+  bool modulus_unknown = false;  ///< E is 1 kPa then, forces are N per kPa, stress is a ratio to E
+  std::string preset;            ///< liver, uterus, ...; fills the two numbers above where they are not given
 
   /// Of the elements with label 1, 2, ...; elements with label 0, or with one that is not here, have the two above.
   std::vector<Stiffness> of_label = {};
@@ -32,7 +34,14 @@ struct TissueOptions {
 
 void describe(Settings& settings, TissueOptions& options);
 
-/// "saint-venant-kirchhoff", as in the scene file.
+/// What a force, a stress counts in: "N", "kPa"; where the modulus is unknown "N/kPa", "of E".
+std::string force_unit(const TissueOptions& tissue);
+std::string stress_unit(const TissueOptions& tissue);
+/// "27 kPa", "unknown".
+std::string modulus_text(const TissueOptions& tissue);
+
+/// Every law with its name in the scene file: "saint-venant-kirchhoff".
+const std::vector<std::pair<std::string, Law>>& law_words();
 std::string law_name(Law law);
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;

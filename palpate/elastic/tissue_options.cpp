@@ -32,8 +32,11 @@ std::string preset_list() {
   return text;
 }
 
+constexpr double kModulusWhereUnknown_kPa = 1;
+
 void fill_from_preset(TissueOptions& tissue) {
   if (tissue.preset.empty()) {
+    if (tissue.modulus_unknown) tissue.young_modulus_kPa = kModulusWhereUnknown_kPa;
     if (tissue.young_modulus_kPa <= 0)
       throw BadInput("tissue needs young_modulus_kPa (and poisson_ratio), or a preset");
     return;
@@ -44,12 +47,26 @@ void fill_from_preset(TissueOptions& tissue) {
     if (preset.name != tissue.preset) continue;
     if (tissue.young_modulus_kPa > 0)
       throw BadInput("tissue has both preset and young_modulus_kPa, expected one of them");
-    tissue.young_modulus_kPa = preset.young_modulus_kPa;
+    tissue.young_modulus_kPa = tissue.modulus_unknown ? kModulusWhereUnknown_kPa : preset.young_modulus_kPa;
     tissue.poisson_ratio = preset.poisson_ratio;
     tissue.preset.clear();
     return;
   }
   throw BadInput(fmt::format("tissue.preset is '{}', expected one of: {}", tissue.preset, fmt::join(names, ", ")));
+}
+
+}  // namespace
+
+void describe(Settings& settings, TissueOptions& options) {
+  settings.choice("law", options.law, law_words(),
+                  "elastic law; neo-hookean is the one to use for pushing, linear holds for small motions only");
+  settings.number_or_word("young_modulus_kPa", options.young_modulus_kPa, {0, 1e8, true, false}, "unknown",
+                          options.modulus_unknown,
+                          "Young's modulus E; the force is proportional to it. unknown: forces are N per kPa of E, and "
+                          "every row warns modulus_unknown (palpate modulus finds E from one measured contact)");
+  settings.number("poisson_ratio", options.poisson_ratio, {0, 0.5, false, true}, "Poisson's ratio nu");
+  settings.text("preset", options.preset, "instead of the two numbers: " + preset_list());
+  settings.after_reading([&options] { fill_from_preset(options); });
 }
 
 const std::vector<std::pair<std::string, Law>>& law_words() {
@@ -61,22 +78,22 @@ const std::vector<std::pair<std::string, Law>>& law_words() {
   return kWords;
 }
 
-}  // namespace
-
-void describe(Settings& settings, TissueOptions& options) {
-  settings.choice("law", options.law, law_words(),
-                  "elastic law; neo-hookean is the one to use for pushing, linear holds for small motions only");
-  settings.number("young_modulus_kPa", options.young_modulus_kPa, {0, 1e8, true, false},
-                  "Young's modulus E; the force is proportional to it");
-  settings.number("poisson_ratio", options.poisson_ratio, {0, 0.5, false, true}, "Poisson's ratio nu");
-  settings.text("preset", options.preset, "instead of the two numbers: " + preset_list());
-  settings.after_reading([&options] { fill_from_preset(options); });
-}
-
 std::string law_name(Law law) {
   for (const auto& word : law_words())
     if (word.second == law) return word.first;
   return {};
+}
+
+std::string force_unit(const TissueOptions& tissue) {
+  return tissue.modulus_unknown ? "N/kPa" : "N";
+}
+
+std::string stress_unit(const TissueOptions& tissue) {
+  return tissue.modulus_unknown ? "of E" : "kPa";
+}
+
+std::string modulus_text(const TissueOptions& tissue) {
+  return tissue.modulus_unknown ? "unknown" : fmt::format("{:g} kPa", tissue.young_modulus_kPa);
 }
 
 Lame lame_of(const TissueOptions& tissue) {

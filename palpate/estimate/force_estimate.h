@@ -37,7 +37,8 @@ struct ForceEstimate {
   double max_von_mises_kPa = 0;
   double residual = 0;
   double misfit_mm = 0;
-  ForceBand band;  ///< from the images, at the stated tissue
+  ForceBand band;        ///< from the images, at the stated tissue
+  ForceBand total_band;  ///< with what is not known of the tissue
   Hold grip = Hold::free;
   double p_contact = 0;
   double footprint_mm = 0;       ///< radius as estimated

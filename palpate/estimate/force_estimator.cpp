@@ -1,9 +1,13 @@
 #include "palpate/estimate/force_estimator.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
+#include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
+#include "palpate/estimate/map_model.h"
 #include "palpate/elastic/stress.h"
 #include "palpate/infer/band.h"
 #include "palpate/infer/force_filter.h"
@@ -19,23 +23,23 @@ constexpr double kMinPointsObscured = 0.6, kMinPoints = 0.25;
 /// A hidden tip's force is told where its deviation is below this ratio of it.
 constexpr double kTellingDeviation = 0.4;
 
-AttachedMesh attached(const TissueMap& map, const Rectification& rectification, TetMesh mesh) {
-  std::vector<int> fixed = select_attachments(mesh, map.attachments, [&rectification](const Vec3& point) {
-    return project_to_recorded_left(rectification.rig, point);
-  });
-  return {std::move(mesh), std::move(fixed)};
-}
-
-/// The map, finer around the places that are held: edges of the stated radius about the patch, of half of it beneath.
-ContactModel::MeshAround refined_around(const TissueMap& map, const Rectification& rectification, double radius_mm) {
-  return [map, rectification, radius_mm](const std::vector<Vec3>& places_mm) {
-    TetMesh mesh = map.mesh;
-    for (const Vec3& place_mm : places_mm) {
-      mesh = refine_near(mesh, place_mm, 1.5 * radius_mm, radius_mm);
-      mesh = refine_near(mesh, place_mm, 0.7 * radius_mm, 0.6 * radius_mm);
-    }
-    return attached(map, rectification, std::move(mesh));
-  };
+/// The tissue that was measured at a pixel of the recorded left image; nothing for no pixel. Throws BadInput.
+std::optional<Vec3> place_at(const TissueMap& map, const Rectification& rectification,
+                             const std::vector<cv::Point2d>& at_px) {
+  if (at_px.empty()) return std::nullopt;
+  constexpr double kFarthest_px = 15;
+  double nearest_px = kFarthest_px;
+  std::optional<Vec3> place_mm;
+  for (const Vec3& point_mm : map.cloud.position_mm) {
+    const double distance_px = cv::norm(project_to_recorded_left(rectification.rig, point_mm) - at_px.front());
+    if (distance_px >= nearest_px) continue;
+    nearest_px = distance_px;
+    place_mm = point_mm;
+  }
+  if (!place_mm)
+    throw BadInput(fmt::format("contact.at_px is [{:g}, {:g}], where no tissue was measured, expected a pixel of the organ",
+                               at_px.front().x, at_px.front().y));
+  return place_mm;
 }
 
 }  // namespace
@@ -44,36 +48,43 @@ struct ForceEstimator::State {
   TissueMap map;
   Rectification rectification;
   InferenceParameters tuning;
+  ForceUncertainty uncertainty;
   double radius_mm;
+  std::optional<Vec3> held_at_mm;  ///< where the operator says that the tissue is held
+  int held_from_frame;
   InstrumentTracker instruments;
   PictureWatch pictures;
   TissueTracker tissue;
   ForceFilter filter;
 
   State(TissueMap m, const RectifiedPair& rest, const Rectification& r, const InstrumentOptions& instrument,
-        const ContactOptions& contact, const InferenceParameters& t)
+        const ContactOptions& contact, const InferenceParameters& t, ForceUncertainty u)
       : map(std::move(m)),
         rectification(r),
         tuning(t),
+        uncertainty(std::move(u)),
         radius_mm(contact.footprint_radius_mm),
+        held_at_mm(place_at(map, r, contact.at_px)),
+        held_from_frame(contact.at_frame),
         instruments(instrument, r, rest, map.organ_mask),
         pictures(rest.left),
         tissue(rest, r, map.disparity.disparity_px, map.organ_mask & r.valid_left),
-        filter(ContactModel(refined_around(map, r, radius_mm), map.tissue, map.element), {map.mesh, map.fixed_nodes},
+        filter(contact_model(map, r, radius_mm), {map.mesh, map.fixed_nodes},
                tissue.points(), r, contact, t) {}
 
-  /// One row of forces.csv.
-  void report(const InstrumentAnswer& answer, const FrameAnswer& whole, bool tip_visible, ForceEstimate& estimate) {
+  /// One row of forces.csv. `tip_known`: seen, or told by the operator.
+  void report(const InstrumentAnswer& answer, const FrameAnswer& whole, bool tip_known, ForceEstimate& estimate) {
     estimate.tip_mm = answer.tip_mm;
     estimate.grip = answer.hold;
     estimate.p_contact = answer.p_contact;
     estimate.misfit_mm = answer.misfit_mm;
     estimate.in_contact = answer.hold != Hold::free;
-    estimate.status = tip_visible ? FrameStatus::no_contact : FrameStatus::tool_lost;
+    estimate.status = tip_known ? FrameStatus::no_contact : FrameStatus::tool_lost;
     estimate.footprint_mm = radius_mm;
     estimate.band = {0, unnoticed_force_N(map.tissue, radius_mm, tuning)};
+    estimate.total_band = total_band(estimate.band, 0, uncertainty.modulus);
     if (!estimate.in_contact) {
-      if (tip_visible && !whole.explained) estimate.status = FrameStatus::map_stale;
+      if (tip_known && !whole.explained) estimate.status = FrameStatus::map_stale;
       return;
     }
     const Equilibrium& equilibrium = *whole.equilibrium;
@@ -90,6 +101,8 @@ struct ForceEstimator::State {
     estimate.force_N = answer.force_N;
     estimate.mean_nodal_force_N = answer.mean_nodal_force_N;
     estimate.band = force_band(answer.force_N, answer.force_covariance_N2);
+    estimate.total_band = total_band(estimate.band, answer.force_N.norm(),
+                                     uncertainty.log_deviation(answer.place_mm, answer.q_mm));
     estimate.status = whole.explained ? FrameStatus::ok : FrameStatus::map_stale;
     const double half_width_N = 0.5 * (estimate.band.high_N - estimate.band.low_N);
     if (!answer.tip_inferred || half_width_N < 2 * kTellingDeviation * estimate.force_N.norm()) return;
@@ -119,9 +132,9 @@ struct ForceEstimator::State {
 
 ForceEstimator::ForceEstimator(TissueMap map, const StereoFrame& static_frame, const Rectification& rectification,
                                const InstrumentOptions& instrument, const ContactOptions& contact,
-                               const InferenceParameters& tuning)
+                               const InferenceParameters& tuning, ForceUncertainty uncertainty)
     : state_(std::make_unique<State>(std::move(map), rectify(rectification, static_frame), rectification, instrument,
-                                     contact, tuning)) {}
+                                     contact, tuning, std::move(uncertainty))) {}
 ForceEstimator::~ForceEstimator() = default;
 ForceEstimator::ForceEstimator(ForceEstimator&&) noexcept = default;
 
@@ -135,6 +148,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   estimate.frame = frame.index;
   estimate.time_s = frame.time_s;
   estimate.status = FrameStatus::tool_lost;
+  if (s.map.tissue.modulus_unknown) estimate.warnings.push_back("modulus_unknown");
   estimate.further.resize(kMostInstruments - 1, estimate);
   const auto of = [&estimate](size_t instrument) -> ForceEstimate& {
     return instrument == 0 ? estimate : estimate.further[instrument - 1];
@@ -152,7 +166,12 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   const InstrumentObservations instruments = s.instruments.update(pair);
   estimate.left_instrument_mask = instruments.left_mask;
   const bool after_map = frame.index > s.map.frame;
-  FrameEvidence evidence{frame.time_s, {}, instruments.tips, after_map && !quality.repeated};
+  FrameEvidence evidence;
+  evidence.time_s = frame.time_s;
+  evidence.tips = instruments.tips;
+  evidence.may_touch = after_map && !quality.repeated;
+  if (frame.index >= s.held_from_frame) evidence.held_at_mm = s.held_at_mm;
+  evidence.held_for_sure = frame.index == s.held_from_frame;
   std::vector<TissuePoint> wanted;
   if (after_map) {
     wanted = s.filter.wanted_points();
@@ -172,7 +191,10 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
     if (instruments.eyes_out_of_step) of(i).warnings.push_back("eyes_out_of_step");
     if (obscured) continue;
     if (!after_map) answer.instruments[i].tip_mm = instruments.tips[i].tip_mm;
-    s.report(answer.instruments[i], answer, instruments.tips[i].visible, of(i));
+    const bool is_told = i == 0 && s.held_at_mm;
+    if (is_told && answer.instruments[i].hold == Hold::free)
+      answer.instruments[i].tip_mm = answer.scene.apply(*s.held_at_mm);
+    s.report(answer.instruments[i], answer, is_told || instruments.tips[i].visible, of(i));
     of(i).scene_mm = answer.scene.translation_mm;
   }
   if (answer.equilibrium) s.show(answer, estimate);

@@ -4,6 +4,7 @@
 
 #include "palpate/contact/contact_options.h"
 #include "palpate/estimate/force_estimate.h"
+#include "palpate/estimate/force_uncertainty.h"
 #include "palpate/estimate/tissue_map.h"
 #include "palpate/infer/inference_parameters.h"
 #include "palpate/instrument/instrument_tracker.h"
@@ -14,10 +15,10 @@ namespace palpate {
 /// between frames.
 class ForceEstimator {
  public:
-  /// `static_frame`: the frame that the map was built from.
+  /// `static_frame`: the frame that the map was built from; `uncertainty`: of the tissue, for the total band.
   ForceEstimator(TissueMap map, const StereoFrame& static_frame, const Rectification& rectification,
                  const InstrumentOptions& instrument, const ContactOptions& contact,
-                 const InferenceParameters& tuning = {});
+                 const InferenceParameters& tuning = {}, ForceUncertainty uncertainty = {});
   ~ForceEstimator();
   ForceEstimator(ForceEstimator&&) noexcept;
 

@@ -99,8 +99,20 @@ void describe(Settings& settings, Scene& scene) {
   settings.not_yet(kSceneKeysNotYet);
   settings.group("contact", "when and how the tip holds the tissue",
                  [&scene](Settings& group) { describe(group, scene.contact); });
-  settings.group("tuning", "numbers that the inference decides by (docs/inference.md)",
-                 [&scene](Settings& group) { describe(group, scene.tuning); });
+  settings.group("uncertainty", "what is not known of the tissue, one standard deviation each: widens the total band",
+                 [&scene](Settings& group) { describe(group, scene.uncertainty); });
+  settings.group(
+      "tuning", "numbers that the inference decides by (docs/inference.md)",
+      [&scene](Settings& group) { describe(group, scene.tuning); }, &scene.has_tuning);
+  settings.after_reading([&scene] {
+    if (!scene.contact.at_px.empty() && (scene.instrument.segmentation != "none" || !scene.instrument.track.empty()))
+      throw BadInput(
+          "contact.at_px says where tissue is held when no instrument is looked for, expected instrument.segmentation: "
+          "none (and no instrument.track) beside it");
+    if (scene.tissue.modulus_unknown && !scene.map.labels.empty())
+      throw BadInput(
+          "tissue.young_modulus_kPa is unknown while map.labels states moduli in kPa, expected a number for both");
+  });
 }
 
 Scene read_scene(const std::filesystem::path& file) {

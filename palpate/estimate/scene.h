@@ -4,6 +4,7 @@
 
 #include "palpate/contact/contact_options.h"
 #include "palpate/core/settings.h"
+#include "palpate/estimate/force_uncertainty.h"
 #include "palpate/estimate/tissue_map.h"
 #include "palpate/infer/inference_parameters.h"
 #include "palpate/instrument/instrument_tracker.h"
@@ -19,7 +20,9 @@ struct Scene {
   AttachmentOptions attachments;
   InstrumentOptions instrument;
   ContactOptions contact;
+  UncertaintyOptions uncertainty;
   InferenceParameters tuning;
+  bool has_tuning = false;  ///< stands in the file, and is written
 };
 
 /// Binds every part but `recording`, which a scene that is to be simulated does not have.

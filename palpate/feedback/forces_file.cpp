@@ -99,8 +99,10 @@ ForceRow to_row(const ForceEstimate& estimate) {
   row.footprint_mm = finite_or(estimate.footprint_mm, 0);
   row.p_contact = finite_or(estimate.p_contact, 0);
   if (row.in_contact) row.grip = hold_name(estimate.grip);
-  row.force_low_N = row.force_low_total_N = finite_or(estimate.band.low_N, 0);
-  row.force_high_N = row.force_high_total_N = finite_or(estimate.band.high_N, 0);
+  row.force_low_N = finite_or(estimate.band.low_N, 0);
+  row.force_high_N = finite_or(estimate.band.high_N, 0);
+  row.force_low_total_N = finite_or(estimate.total_band.low_N, 0);
+  row.force_high_total_N = finite_or(estimate.total_band.high_N, 0);
   if (status == FrameStatus::no_contact || status == FrameStatus::not_converged) return row;
 
   row.force_N = estimate.force_N;

@@ -160,7 +160,7 @@ OverlayPainter::OverlayPainter(const Rectification& rectification, const TissueO
       colours_(colour_table(options.colour_map)),
       stress_scale_kPa_(options.stress_scale_kPa > 0 ? options.stress_scale_kPa
                                                      : round_up(kStrainOfLowestScale * tissue.young_modulus_kPa)),
-      chart_(options.chart_duration_s) {
+      chart_(options.chart_duration_s, force_unit(tissue)) {
   if (!rectification.identity) rectified_px_ = rectified_pixels(rectification, rectification.size);
 }
 
@@ -284,7 +284,7 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   }
 
   const double text_px = 14 * scale;
-  const std::string text = three_digits(force_N) + (estimate.status == FrameStatus::map_stale ? " N ?" : " N");
+  const std::string text = three_digits(force_N) + " " + force_unit(tissue_) + (estimate.status == FrameStatus::map_stale ? " ?" : "");
   const cv::Point2d away = along_sight ? cv::Point2d(0, -1) : (head - tip) * (1 / cv::norm(head - tip));
   const int half = text_width(text, text_px, true) / 2 + px(4);
   const double gap = std::abs(away.x) * half + std::abs(away.y) * text_px + (along_sight ? 18 : 8) * scale;
@@ -323,7 +323,7 @@ void OverlayPainter::draw_readings(cv::Mat& image, const ForceEstimate& estimate
       stress_is_trusted(estimate) ? "max " + three_digits(greatest_stress_kPa(estimate)) : "max -";
   const int bar_width = px(118);
   draw_colour_bar(image, {image.cols - bar_width - px(8), px(8), bar_width, px(220)}, colours_,
-                  {0, stress_scale_kPa_, "von Mises (kPa)", greatest}, scale);
+                  {0, stress_scale_kPa_, "von Mises (" + stress_unit(tissue_) + ")", greatest}, scale);
 }
 
 void OverlayPainter::draw_frame(cv::Mat& image, const ForceEstimate& estimate) const {
@@ -331,7 +331,7 @@ void OverlayPainter::draw_frame(cv::Mat& image, const ForceEstimate& estimate) c
   const auto px = [scale](double size) { return cvRound(size * scale); };
   const double force_N = has_force(estimate) ? estimate.force_N.norm() : 0;
   const std::string tissue =
-      fmt::format("{}, E = {} kPa, nu = {}, F/E = {} mm^2", law_name(tissue_.law), tick_text(tissue_.young_modulus_kPa),
+      fmt::format("{}, E {} {}, nu = {}, F/E = {} mm^2", law_name(tissue_.law), tissue_.modulus_unknown ? "is" : "=", modulus_text(tissue_),
                   tick_text(tissue_.poisson_ratio), three_digits(force_N / tissue_.young_modulus_MPa()));
   const std::string purpose = "research use only";
   const bool two_lines = text_width(tissue, text_px) + text_width(purpose, text_px) + px(40) > image.cols;

@@ -103,9 +103,9 @@ std::string cards(const Report& report, const std::optional<Comparison>& compari
     return a.force_magnitude_N < b.force_magnitude_N;
   });
   const double peak_N = peak == report.rows.end() ? 0 : peak->force_magnitude_N;
-  std::string html = card(three_digits(peak_N) + " N", "peak force");
+  std::string html = card(three_digits(peak_N) + " " + force_unit(report.tissue), "peak force");
   // Not the greatest stress of the run: in a frame where elements invert that number means nothing.
-  if (peak_N > 0) html += card(three_digits(peak->max_von_mises_kPa) + " kPa", "greatest von Mises stress then");
+  if (peak_N > 0) html += card(three_digits(peak->max_von_mises_kPa) + " " + stress_unit(report.tissue), "greatest von Mises stress then");
   if (comparison) {
     html += card(comparison->force_nrmse_pct ? fmt::format("{:.1f} %", *comparison->force_nrmse_pct) : "-",
                  "force error (NRMSE, of the true peak)");
@@ -124,9 +124,9 @@ std::string cards(const Report& report, const std::optional<Comparison>& compari
                                       : "";
   return "<div class=\"cards\">" + html + "</div>\n" +
          fmt::format(
-             "<p class=\"note\">Tissue assumed: {}, E = {} kPa, &nu; = {}. The force is proportional to the "
+             "<p class=\"note\">Tissue assumed: {}, E {} {}, &nu; = {}. The force is proportional to the "
              "Young&rsquo;s modulus assumed: {}twice the modulus, twice the force.</p>\n",
-             law_name(report.tissue.law), tick_text(report.tissue.young_modulus_kPa),
+             law_name(report.tissue.law), report.tissue.modulus_unknown ? "is" : "=", modulus_text(report.tissue),
              tick_text(report.tissue.poisson_ratio), ratio);
 }
 
@@ -147,7 +147,7 @@ std::string notes(const std::vector<ForceRow>& rows) {
 
 std::string force_section(const Report& report) {
   Chart chart;
-  chart.value_title = "force of the instrument on the tissue (N)";
+  chart.value_title = fmt::format("force of the instrument on the tissue ({})", force_unit(report.tissue));
   chart.from_zero = true;
   const auto force = [](const ForceRow& row) { return has_answer(row) ? row.force_magnitude_N : kGap; };
   chart.series.push_back(series_of("estimate", "estimate", report.rows, force));
@@ -175,7 +175,7 @@ std::string force_section(const Report& report) {
       "<span><i class=\"ok\"></i>contact</span><span><i class=\"no_contact\"></i>no contact</span>"
       "<span><i class=\"doubt\"></i>lost, not converged or stale</span>";
   if (!report.truth.empty()) legend += "<span><i class=\"true_contact\"></i>true contact</span>";
-  return "<h2>Force over time</h2>\n<div class=\"legend\">" + legend + "</div>" + chart_html(chart, "N", 320) +
+  return "<h2>Force over time</h2>\n<div class=\"legend\">" + legend + "</div>" + chart_html(chart, force_unit(report.tissue), 320) +
          fmt::format("<p class=\"faint\">{} frames ({})</p>\n", report.rows.size(), counts);
 }
 

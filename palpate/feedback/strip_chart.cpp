@@ -2,13 +2,20 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/draw.h"
 
 namespace palpate {
 
-StripChart::StripChart(double duration_s) : duration_s_(duration_s) {}
+namespace {
+/// End of the axis at first: a small force; for one kPa of a soft tissue a hundredth of it.
+constexpr double kFirstMax_N = 0.1, kFirstMaxPerModulus = 0.001;
+}  // namespace
+
+StripChart::StripChart(double duration_s, std::string unit)
+    : duration_s_(duration_s), unit_(std::move(unit)), most_N_(unit_ == "N" ? kFirstMax_N : kFirstMaxPerModulus) {}
 
 void StripChart::add(double time_s, std::optional<double> force_N) {
   samples_.push_back({time_s, force_N});
@@ -21,7 +28,7 @@ void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& co
   const double text_px = 8 * scale;
   const auto px = [scale](double size) { return cvRound(size * scale); };
   const cv::Rect plot(area.x + px(38), area.y + px(30), area.width - px(54), area.height - px(52));
-  draw_text(image, "force (N)", {area.x + px(8), area.y + px(15)}, text_px, kInk);
+  draw_text(image, "force (" + unit_ + ")", {area.x + px(8), area.y + px(15)}, text_px, kInk);
 
   const double first_s = samples_.empty() ? 0 : std::max(samples_.front().time_s, samples_.back().time_s - duration_s_);
   const auto x_of = [&](double time_s) { return plot.x + (time_s - first_s) / duration_s_ * plot.width; };

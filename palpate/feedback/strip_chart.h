@@ -3,6 +3,7 @@
 #include <deque>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 
 namespace palpate {
 
@@ -10,8 +11,8 @@ namespace palpate {
 /// steps, so that the curve does not jump.
 class StripChart {
  public:
-  /// Shows the last `duration_s` seconds.
-  explicit StripChart(double duration_s);
+  /// Shows the last `duration_s` seconds of forces in `unit`, "N" or "N/kPa".
+  explicit StripChart(double duration_s, std::string unit = "N");
 
   /// `force_N` is empty in a frame without an answer: the curve has a gap there.
   void add(double time_s, std::optional<double> force_N);
@@ -29,7 +30,8 @@ class StripChart {
   };
 
   double duration_s_;
-  double most_N_ = 0.1;
+  std::string unit_;
+  double most_N_;
   std::deque<Sample> samples_;
 };
 

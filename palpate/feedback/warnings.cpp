@@ -9,6 +9,7 @@ const std::vector<std::pair<std::string, std::string>>& known_warnings() {
       {"law_out_of_range", "tissue deformed beyond the law's range"},
       {"inverted_elements", "elements of the map turned inside out"},
       {"near_attachment", "contact close to where the tissue is held"},
+      {"modulus_unknown", "Young's modulus unknown: force in N per kPa"},
       {"tip_inferred", "tip hidden, the tissue tells the force"},
       {"camera_missing", "one camera has no picture"},
       {"sliding", "the tip slides over the tissue"},

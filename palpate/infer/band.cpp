@@ -5,21 +5,16 @@
 
 namespace palpate {
 
-namespace {
-/// Of a standard normal distribution: 97.5 %.
-constexpr double kQuantile = 1.96;
-}  // namespace
-
 ForceBand force_band(const Vec3& force_N, const Mat3& covariance_N2) {
   const double magnitude_N = force_N.norm();
   const Vec3 direction = magnitude_N > 0 ? Vec3(force_N / magnitude_N) : Vec3::UnitZ();
   const double deviation_N = std::sqrt(std::max(0.0, direction.dot(covariance_N2 * direction)));
-  return {std::max(0.0, magnitude_N - kQuantile * deviation_N), magnitude_N + kQuantile * deviation_N};
+  return {std::max(0.0, magnitude_N - kBandQuantile * deviation_N), magnitude_N + kBandQuantile * deviation_N};
 }
 
 double unnoticed_force_N(const TissueOptions& tissue, double radius_mm, const InferenceParameters& parameters) {
   const double nu = tissue.poisson_ratio;
-  return kQuantile * parameters.touch_mm * 2 * radius_mm * tissue.young_modulus_MPa() / (1 - nu * nu);
+  return kBandQuantile * parameters.touch_mm * 2 * radius_mm * tissue.young_modulus_MPa() / (1 - nu * nu);
 }
 
 }  // namespace palpate

@@ -12,6 +12,9 @@ struct ForceBand {
   double high_N = 0;
 };
 
+/// Of a standard normal distribution: 97.5 %.
+constexpr double kBandQuantile = 1.96;
+
 ForceBand force_band(const Vec3& force_N, const Mat3& covariance_N2);
 
 /// The force that would have gone unnoticed without a contact: what a rigid disc of this radius bears on a half-space

@@ -69,13 +69,14 @@ Belief with_contact(const Belief& belief, const ContactPrior& prior) {
   const Eigen::Index before = belief.mean.size(), after = before + Unknowns::kContact;
   Belief next;
   next.mean = Eigen::VectorXd::Zero(after);
-  next.mean << belief.mean, prior.q_mm, prior.offset_mm, prior.log_radius, 0;
+  next.mean << belief.mean, prior.q_mm, prior.offset_mm, prior.log_radius, Vec3::Zero();
   next.covariance = Eigen::MatrixXd::Zero(after, after);
   next.covariance.topLeftCorner(before, before) = belief.covariance;
   next.covariance.block<3, 3>(before, before) = prior.q_covariance_mm2;
   next.covariance.block<3, 3>(before + 3, before + 3) = prior.offset_covariance_mm2;
   next.covariance(before + 6, before + 6) = prior.log_radius_deviation * prior.log_radius_deviation;
-  next.covariance(before + 7, before + 7) = prior.gain_deviation * prior.gain_deviation;
+  next.covariance.block<3, 3>(before + 7, before + 7) =
+      prior.skew_deviation * prior.skew_deviation * Mat3::Identity();
   return next;
 }
 

@@ -47,6 +47,9 @@ double log_normal3(const Vec3& x, const Mat3& covariance) {
          (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
 }
 
+/// A place that the operator names is held with this probability, until the tissue says so.
+constexpr double kHeldUntold = 0.02;
+
 /// What is kept of one instrument.
 struct Hand {
   explicit Hand(Grip grip) : filter(grip) {}
@@ -56,6 +59,7 @@ struct Hand {
   std::optional<Vec3> last_tip_mm;     ///< in the map frame
   std::optional<Vec3> released_at_mm;  ///< in the map frame, until it has left
   std::optional<bool> was_closed;
+  bool is_told = false;  ///< the operator says where it holds; there is no tip
   double onset_s = 0;
   SceneMotion free_scene;            ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();  ///< the offset with which the patch was laid
@@ -171,36 +175,54 @@ struct ForceFilter::State {
     }
   }
 
+  ContactPrior prior_of_touch() const {
+    ContactPrior prior;
+    prior.q_covariance_mm2 = parameters.touch_mm * parameters.touch_mm * Mat3::Identity();
+    prior.offset_covariance_mm2 = parameters.offset_mm * parameters.offset_mm * Mat3::Identity();
+    prior.log_radius = stated_log_radius();
+    prior.skew_deviation = parameters.skew;
+    prior.log_radius_deviation = options.drive == Drive::fused ? parameters.log_radius : 1e-3;
+    return prior;
+  }
+
+  void begin_at(size_t instrument, const Vec3& place_mm, const ContactPrior& prior) {
+    Hand& hand = hands[instrument];
+    model.begin(place_mm, options.footprint_radius_mm);
+    hand.contact = model.contact_count() - 1;
+    instrument_of_contact.push_back(instrument);
+    hand.released_at_mm.reset();
+    hand.slid_from_mm.setZero();
+    hand.onset_s = last_time_s;
+    belief = with_contact(belief, prior);
+    solve_anew();
+  }
+
+  /// The contact begins where the operator says; whether it holds is for the tissue to tell.
+  void begin_told(size_t instrument, const FrameEvidence& frame) {
+    begin_at(instrument, *frame.held_at_mm, prior_of_touch());
+    hands[instrument].is_told = true;
+    hands[instrument].filter.touch(frame.held_for_sure ? 1 : kHeldUntold);
+    hands[instrument].free_scene = belief.scene(about_mm);
+  }
+
   /// The contact begins where the tip is nearest to the surface.
   void begin(size_t instrument, const TipObservation& tip, const Gap& gap, bool unnoticed) {
     Hand& hand = hands[instrument];
-    model.begin(place_at_rest(gap), options.footprint_radius_mm);
-    hand.contact = model.contact_count() - 1;
-    instrument_of_contact.push_back(instrument);
     hand.tip_at_mark_mm = tip.tip_mm;
-    hand.released_at_mm.reset();
-    hand.slid_from_mm.setZero();
-    ContactPrior prior;
-    prior.q_covariance_mm2 = parameters.touch_mm * parameters.touch_mm * Mat3::Identity();
+    ContactPrior prior = prior_of_touch();
     if (unnoticed) {
       prior.q_mm = std::min(0.0, gap.distance_mm) * gap.normal;
       const double deviation_mm = parameters.touch_mm + 0.5 * std::abs(gap.distance_mm);
       prior.q_covariance_mm2 = deviation_mm * deviation_mm * Mat3::Identity();
     }
-    prior.offset_covariance_mm2 = parameters.offset_mm * parameters.offset_mm * Mat3::Identity();
-    prior.log_radius = stated_log_radius();
-    prior.gain_deviation = parameters.gain;
-    prior.log_radius_deviation = options.drive == Drive::fused ? parameters.log_radius : 1e-3;
-    belief = with_contact(belief, prior);
-    solve_anew();
+    begin_at(instrument, place_at_rest(gap), prior);
     // Where the tip stands against the patch: the displacement of the first frame is known to touch_mm.
     FrameData data;
     data.seconds = 0.04;
-    data.tips.push_back({*hand.contact, tip.tip_mm, tip.covariance_mm2});
+    data.tips.push_back({*hand.contact, tip.tip_mm, Mat3::Zero()});  // from now on the tip counts from here
     const ContactFit fit = fit_linear(belief, data, *body, model, context());
     belief = fit.kept;
     hand.slid_from_mm = belief.offset_mm(*hand.contact);
-    hand.onset_s = last_time_s;
   }
 
   /// Where a tip without contact stands against the surface, and whether it touches.
@@ -297,6 +319,9 @@ struct ForceFilter::State {
     FrameData without = data;
     std::erase_if(without.tips, [k](const ContactTip& t) { return t.contact == k; });
     for (ContactTip& t : without.tips) t.contact -= t.contact > k;
+    // Every hypothesis is scored with the same noise.
+    const PredictedBody held{&body->response, &body->places, body->unknowns(tied.posterior), about_mm, &model};
+    for (TissuePoint& point : without.tissue) point.model_mm = model_error_mm(point, held, parameters);
     const Belief free_prior = without_contact(prior, k);
     const ContactFit free =
         model.contact_count() == 1 ? fit_at_rest(free_prior, without, context()) : free_of(free_prior, without, k);
@@ -319,7 +344,8 @@ struct ForceFilter::State {
     hand.filter.update(log_likelihood);
     if (hand.filter.probability(Hold::free) > 0.5 || tip.closed == false) {
       // Near its place the tip may still turn out to hold the tissue.
-      if (tip.visible && tip.closed.value_or(true) && is_near_its_patch(tip, free.posterior, k)) {
+      if (hand.is_told ||
+          (tip.visible && tip.closed.value_or(true) && is_near_its_patch(tip, free.posterior, k))) {
         hand.free_scene = free.posterior.scene(about_mm);
         keep_slow(prior, k, belief);
         return;
@@ -386,6 +412,8 @@ struct ForceFilter::State {
     const double solved_N = solved.force_N.norm();
     answer.mean_nodal_force_N =
         solved_N > 0 ? solved.mean_nodal_force_N * force.force_N.norm() / solved_N : solved.mean_nodal_force_N;
+    answer.place_mm = model.footprint(k).center_mm;
+    answer.q_mm = fit.posterior.q_mm(k);
     answer.footprint_mm = std::exp(fit.posterior.log_radius(k));
     answer.tip_inferred = !tip.visible;
     answer.tip_mm = scene.apply(model.footprint(k).center_mm + fit.posterior.q_mm(k));
@@ -396,7 +424,7 @@ struct ForceFilter::State {
   /// is explained.
   double misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {
     PredictedBody predicted{nullptr, nullptr, at.mean, about_mm};
-    if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm};
+    if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm, &model};
     const std::vector<Measurement> rows = tissue_measurements(data.tissue, predicted, rectification, parameters);
     std::vector<double> misfits;
     size_t unexplained = 0;
@@ -547,6 +575,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     Hand& hand = s.hands[i];
     if (!tip.visible) {
       hand.last_tip_mm.reset();
+      if (i == 0 && !hand.contact && frame.held_at_mm) s.begin_told(i, frame);
       continue;
     }
     if (!hand.contact && frame.may_touch) {

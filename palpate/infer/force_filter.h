@@ -20,6 +20,9 @@ struct FrameEvidence {
   std::vector<TissuePoint> tissue;
   std::vector<TipObservation> tips;  ///< of each instrument
   bool may_touch = true;             ///< the picture is new and lies behind the map frame
+  /// Where the first instrument, which is not looked for, may hold the tissue: place at rest; empty = nowhere.
+  std::optional<Vec3> held_at_mm;
+  bool held_for_sure = false;  ///< it does hold it, from this frame on
 };
 
 /// What is believed of one instrument.
@@ -32,6 +35,7 @@ struct InstrumentAnswer {
   Vec3 tip_mm = Vec3::Zero();   ///< left camera frame: in contact the middle of the patch
   Vec3 force_N = Vec3::Zero();  ///< of the instrument on the tissue, left camera frame
   Mat3 force_covariance_N2 = Mat3::Zero();
+  Vec3 place_mm = Vec3::Zero(), q_mm = Vec3::Zero();  ///< middle of the patch at rest, and how it is displaced
   double mean_nodal_force_N = 0;
   double footprint_mm = 0;
   double misfit_mm = 0;

@@ -10,7 +10,8 @@ struct InferenceParameters {
   double point_px = 0.12;          ///< deviation of a tracked point in one camera, px
   double point_dof = 4;            ///< Student-t degrees of freedom of a point
   double effective_points = 25;    ///< effective sample size: more points share their errors with neighbours
-  double motion_error = 0.08;      ///< error of the model's motion of a point, ratio to that motion
+  double motion_error = 0.04;      ///< error of the model's motion of a point, ratio to that motion
+  double far_motion_error = 0.6;   ///< the same as far from the patch as its attachments; grows with the square
   double tip_floor_mm = 0.05;      ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
@@ -27,7 +28,7 @@ struct InferenceParameters {
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
-  double gain = 0.03;                                   ///< of the model's motion of all tissue, ratio to it
+  double skew = 0.05;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 5;                             ///< the radius is learned where the force is so many deviations
 

@@ -10,7 +10,7 @@ namespace palpate {
 
 /// Sizes are known to be small, so that nothing is allocated: a measured vector has at most 3 values, and there are at
 /// most so many unknowns.
-inline constexpr int kMaxValues = 3, kMaxUnknowns = 24;
+inline constexpr int kMaxValues = 3, kMaxUnknowns = 27;
 
 /// One vector that was measured, to first order around a point x0 of the unknowns: z - h(x) = residual - H (x - x0).
 struct Measurement {

@@ -23,6 +23,17 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
   return sum;
 }
 
+/// Ratio of the error of the model's motion of a point to that motion. Near a patch the tissue answers as a half-space would; as far
+/// from it as its attachments are, all that is not known of the body counts (Saint-Venant).
+double motion_error(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t k = 0; body.model && k < body.model->contact_count(); ++k)
+    nearest = std::min(nearest, (point.rest_mm - body.model->footprint(k).center_mm).norm() /
+                                    body.model->distance_to_attachments_mm(k));
+  if (std::isinf(nearest)) return parameters.motion_error;
+  return std::hypot(parameters.motion_error, parameters.far_motion_error * nearest * nearest);
+}
+
 /// dx/d(unknowns) of the point of the body now at R (X + u - about), for a displacement with these derivatives.
 void fill_scene_columns(const Vec3& turned_mm, const Mat3& A, decltype(Measurement::H)& H) {
   H.middleCols<3>(Unknowns::kTranslation) = A;
@@ -56,23 +67,26 @@ std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, cons
   return places;
 }
 
+double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
+  return motion_error(point, body, parameters) * body.displacement_mm(point).norm();
+}
+
 Vec3 PredictedBody::displacement_mm(const TissuePoint& point) const {
   if (!response || !places) return Vec3::Zero();
   const SurfacePlace& place = places->at(static_cast<size_t>(point.number));
   if (!place.on_body) return Vec3::Zero();
   const Belief at{x0, {}};
   Vec3 u_mm = interpolated(place, response->equilibrium.u);
-  for (size_t k = 0; k < at.contacts(); ++k) u_mm += at.gain(k) * displacement_by_mm(point, k);
+  for (size_t k = 0; k < at.contacts(); ++k) u_mm += motion_by(point, k) * at.skew(k) * at.q_mm(k).norm();
   return u_mm;
 }
 
-Vec3 PredictedBody::displacement_by_mm(const TissuePoint& point, size_t contact) const {
+Mat3 PredictedBody::motion_by(const TissuePoint& point, size_t contact) const {
   const SurfacePlace& place = places->at(static_cast<size_t>(point.number));
-  const Vec3 q_mm = x0.segment<3>(Unknowns::q(contact));
-  Vec3 u_mm = Vec3::Zero();
+  Mat3 motion;
   for (Eigen::Index axis = 0; axis < 3; ++axis)
-    u_mm += q_mm[axis] * interpolated(place, response->motion.col(3 * static_cast<Eigen::Index>(contact) + axis));
-  return u_mm;
+    motion.col(axis) = interpolated(place, response->motion.col(3 * static_cast<Eigen::Index>(contact) + axis));
+  return motion;
 }
 
 StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm) {
@@ -114,13 +128,13 @@ std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& see
       const Mat3 A = now.per_mm * R;
       for (size_t k = 0; k < contacts && place.on_body; ++k) {
         const auto column = static_cast<Eigen::Index>(k);
-        for (Eigen::Index axis = 0; axis < 3; ++axis)
-          m.H.col(Unknowns::q(k) + axis) = A * interpolated(place, body.response->motion.col(3 * column + axis));
+        const Mat3 motion = A * body.motion_by(point, k);
+        m.H.middleCols<3>(Unknowns::q(k)) = motion;
         m.H.col(Unknowns::log_radius(k)) = A * interpolated(place, body.response->motion_per_log_radius.col(column));
-        m.H.col(Unknowns::gain(k)) = A * body.displacement_by_mm(point, k);
+        m.H.middleCols<3>(Unknowns::skew(k)) = motion * at.q_mm(k).norm();
       }
     }
-    const double model_mm2 = std::pow(parameters.motion_error, 2) * u_mm.squaredNorm();
+    const double model_mm2 = std::pow(std::max(point.model_mm, model_error_mm(point, body, parameters)), 2);
     m.covariance = point.noise * point.noise * noise_px2 + model_mm2 * now.per_mm * now.per_mm.transpose();
     m.dof = parameters.point_dof;
     m.weight = weight;

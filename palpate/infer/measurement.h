@@ -26,10 +26,11 @@ struct PredictedBody {
   const std::vector<SurfacePlace>* places = nullptr;  ///< by number of the point
   Eigen::VectorXd x0;                                 ///< unknowns at which the response was computed
   Vec3 about_mm = Vec3::Zero();                       ///< of the scene's motion
+  const ContactModel* model = nullptr;                ///< says how far a point is from the patches, in effect
 
-  /// Displacement of a point at x0, mm; the part of it that one contact makes, to first order.
+  /// Displacement of a point at x0, mm; its derivative by the displacement of one patch.
   Vec3 displacement_mm(const TissuePoint& point) const;
-  Vec3 displacement_by_mm(const TissuePoint& point, size_t contact) const;
+  Mat3 motion_by(const TissuePoint& point, size_t contact) const;
 };
 
 /// Left x, left y and disparity of a rectified point; its derivative by the point, left camera frame.
@@ -38,6 +39,9 @@ struct StereoProjection {
   Mat3 per_mm;
 };
 StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm);
+
+/// Error of where the model says that a point is, mm.
+double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters);
 
 /// Tissue points in both cameras: z = pi(S (X + u)) - pi(X) + bias, px.
 std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& seen, const PredictedBody& body,

@@ -15,6 +15,8 @@ namespace {
 constexpr int kWindow_px = 21;
 constexpr int kLevels = 2;
 constexpr int kCompared_px = 13;
+/// Points of each part of the picture.
+constexpr int kInCell = 4;
 /// Margin around an instrument: what moves with it, its shadow and the windows that reach over its edge.
 constexpr int kInstrumentMargin_px = 9;
 
@@ -46,21 +48,42 @@ cv::Mat equalized(const cv::Mat& bgr) {
   return result;
 }
 
-/// What is there moves with the light, not with the tissue.
-bool is_highlight(const cv::Vec3b& pixel) {
+/// How much of a pixel's light is colour: 0 = white.
+double saturation(const cv::Vec3b& pixel) {
   const int max = std::max({pixel[0], pixel[1], pixel[2]}), min = std::min({pixel[0], pixel[1], pixel[2]});
-  return max > 200 && 2 * min > max;
+  return static_cast<double>(max - min) / std::max(1, max);
+}
+
+/// A highlight is bright and far whiter than the tissue: what is there moves with the light. Returns the saturation
+/// below which a bright pixel is one.
+double saturation_of_highlights(const cv::Mat& bgr, const cv::Mat& tissue) {
+  constexpr double kRatio = 0.35;
+  constexpr int kEvery_px = 4;
+  std::vector<double> saturations;
+  for (int y = 0; y < bgr.rows; y += kEvery_px)
+    for (int x = 0; x < bgr.cols; x += kEvery_px)
+      if (tissue.at<uchar>(y, x)) saturations.push_back(saturation(bgr.at<cv::Vec3b>(y, x)));
+  if (saturations.empty()) return 0;
+  const auto middle = saturations.begin() + static_cast<std::ptrdiff_t>(saturations.size() / 2);
+  std::nth_element(saturations.begin(), middle, saturations.end());
+  return kRatio * *middle;
+}
+
+bool is_highlight(const cv::Vec3b& pixel, double white) {
+  constexpr int kBright = 200, kSaturated = 235;
+  const int max = std::max({pixel[0], pixel[1], pixel[2]}), min = std::min({pixel[0], pixel[1], pixel[2]});
+  return min >= kSaturated || (max > kBright && max - min < white * max);
 }
 
 /// 255 on highlights with their halo.
-cv::Mat highlights(const cv::Mat& bgr) {
+cv::Mat highlights(const cv::Mat& bgr, double white) {
   cv::Mat mask(bgr.size(), CV_8U);
   tbb::parallel_for(0, bgr.rows, [&](int y) {
     const auto* row = bgr.ptr<cv::Vec3b>(y);
     uchar* to = mask.ptr<uchar>(y);
-    for (int x = 0; x < bgr.cols; ++x) to[x] = is_highlight(row[x]) ? 255 : 0;
+    for (int x = 0; x < bgr.cols; ++x) to[x] = is_highlight(row[x], white) ? 255 : 0;
   });
-  cv::dilate(mask, mask, cv::Mat::ones(9, 9, CV_8U));
+  cv::dilate(mask, mask, cv::Mat::ones(5, 5, CV_8U));
   return mask;
 }
 
@@ -78,13 +101,13 @@ bool set_or_outside(const cv::Mat& mask, const cv::Size& size, const cv::Point2f
 }
 
 /// More than a speckle of the window is a highlight.
-bool shines(const cv::Mat& bgr, const cv::Point2f& p) {
+bool shines(const cv::Mat& bgr, const cv::Point2f& p, double white) {
   constexpr int kMaxHighlights = 4;
   const cv::Rect window(cvRound(p.x) - kCompared_px / 2, cvRound(p.y) - kCompared_px / 2, kCompared_px, kCompared_px);
   const cv::Mat part = bgr(window & cv::Rect({}, bgr.size()));
   int count = 0;
   for (int y = 0; y < part.rows; ++y)
-    for (int x = 0; x < part.cols; ++x) count += is_highlight(part.at<cv::Vec3b>(y, x));
+    for (int x = 0; x < part.cols; ++x) count += is_highlight(part.at<cv::Vec3b>(y, x), white);
   return count > kMaxHighlights;
 }
 
@@ -108,6 +131,27 @@ std::vector<cv::Mat> pyramid_of(const cv::Mat& grey, bool with_derivatives) {
   return pyramid;
 }
 
+/// The best corners of each part of the picture: tissue of weak texture is followed as well, less surely.
+std::vector<cv::Point2f> spread_corners(const cv::Mat& grey, const cv::Mat& where,
+                                        const TissueTrackerParameters& parameters) {
+  constexpr double kMinQuality = 0.001;
+  constexpr int kBlock_px = 7, kMaxCandidates = 8000;
+  std::vector<cv::Point2f> candidates;
+  cv::goodFeaturesToTrack(grey, candidates, kMaxCandidates, kMinQuality, parameters.spacing_px, where, kBlock_px);
+  const double usable_px2 = std::max(1, cv::countNonZero(where));
+  const int cell_px = std::max(1, static_cast<int>(std::sqrt(kInCell * usable_px2 / parameters.points)));
+  const int columns = grey.cols / cell_px + 1;
+  std::vector<int> taken(static_cast<size_t>(columns * (grey.rows / cell_px + 1)), 0);
+  std::vector<cv::Point2f> chosen;
+  for (const cv::Point2f& p : candidates) {  // the best ones first
+    int& in_cell = taken[static_cast<size_t>(static_cast<int>(p.y) / cell_px * columns + static_cast<int>(p.x) / cell_px)];
+    if (in_cell >= kInCell) continue;
+    ++in_cell;
+    chosen.push_back(p);
+  }
+  return chosen;
+}
+
 /// One camera in the map frame.
 struct CameraReference {
   cv::Mat grey;
@@ -123,7 +167,7 @@ struct Tracks {
 
 /// From the reference into a picture, beginning at `guess`; checked by the windows' correlation.
 Tracks follow(const CameraReference& reference, const std::vector<cv::Point2f>& from, const cv::Mat& bgr,
-              const cv::Mat& instrument, std::vector<cv::Point2f> guess, double min_correlation) {
+              const cv::Mat& instrument, std::vector<cv::Point2f> guess, double min_correlation, double white) {
   const cv::Mat grey = equalized(bgr);
   const std::vector<cv::Mat> pyramid = pyramid_of(grey, false);
   Tracks tracks;
@@ -135,7 +179,7 @@ Tracks follow(const CameraReference& reference, const std::vector<cv::Point2f>& 
   const cv::Mat covered = grown(instrument, kInstrumentMargin_px);
   tracks.correlation.assign(tracks.points.size(), 0);
   tbb::parallel_for(size_t{0}, tracks.points.size(), [&](size_t i) {
-    if (!tracks.found[i] || set_or_outside(covered, grey.size(), tracks.points[i]) || shines(bgr, tracks.points[i])) {
+    if (!tracks.found[i] || set_or_outside(covered, grey.size(), tracks.points[i]) || shines(bgr, tracks.points[i], white)) {
       tracks.found[i] = 0;
       return;
     }
@@ -150,6 +194,7 @@ Tracks follow(const CameraReference& reference, const std::vector<cv::Point2f>& 
 struct TissueTracker::State {
   TissueTrackerParameters parameters;
   CameraReference left, right;
+  double white = 0;  ///< saturation of highlights
   std::vector<TissuePoint> points;
 };
 
@@ -161,18 +206,18 @@ TissueTracker::TissueTracker(const RectifiedPair& reference, const Rectification
   s.parameters = parameters;
   s.left.grey = equalized(reference.left);
   s.right.grey = equalized(reference.right);
+  s.white = saturation_of_highlights(reference.left, usable);
   s.left.pyramid = pyramid_of(s.left.grey, true);
   s.right.pyramid = pyramid_of(s.right.grey, true);
-  cv::Mat where = usable & (disparity_px == disparity_px) & ~highlights(reference.left);
+  cv::Mat where = usable & (disparity_px == disparity_px) & ~highlights(reference.left, s.white);
   cv::erode(where, where, cv::Mat::ones(kCompared_px, kCompared_px, CV_8U));
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(s.left.grey, corners, parameters.points, 0.005, parameters.spacing_px, where, 7);
+  const std::vector<cv::Point2f> corners = spread_corners(s.left.grey, where, parameters);
   if (corners.empty()) return;
 
   std::vector<cv::Point2f> guess = corners;
   for (cv::Point2f& p : guess) p.x -= disparity_px.at<float>(cvRound(p.y), cvRound(p.x));
   const std::vector<cv::Point2f> expected = guess;
-  const Tracks matched = follow(s.left, corners, reference.right, {}, guess, parameters.min_correlation);
+  const Tracks matched = follow(s.left, corners, reference.right, {}, guess, parameters.min_correlation, s.white);
   for (size_t i = 0; i < corners.size(); ++i) {
     constexpr float kAgreement_px = 1;
     const cv::Point2f miss = matched.points[i] - expected[i];
@@ -211,8 +256,8 @@ std::vector<TissuePoint> TissueTracker::update(const RectifiedPair& pair, const 
   Tracks left, right;
   const double min_correlation = s.parameters.min_correlation;
   tbb::parallel_invoke(
-      [&] { left = follow(s.left, left_from, pair.left, left_instrument, left_guess, min_correlation); },
-      [&] { right = follow(s.right, right_from, pair.right, right_instrument, right_guess, min_correlation); });
+      [&] { left = follow(s.left, left_from, pair.left, left_instrument, left_guess, min_correlation, s.white); },
+      [&] { right = follow(s.right, right_from, pair.right, right_instrument, right_guess, min_correlation, s.white); });
   for (size_t i = 0; i < wanted.size(); ++i) {
     if (!left.found[i] || !right.found[i]) continue;
     const cv::Point2f left_motion = left.points[i] - left_from[i], right_motion = right.points[i] - right_from[i];
