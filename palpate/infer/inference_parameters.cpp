@@ -9,6 +9,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("effective_points", p.effective_points, positive, "effective sample size of a frame's points");
   settings.number("motion_error", p.motion_error, {0, 10}, "error of the model's motion of a point, ratio to it");
   settings.number("far_motion_error", p.far_motion_error, {0, 10}, "the same as far from the patch as its attachments are; grows with the square of the distance");
+  settings.number("rim_motion_error", p.rim_motion_error, {0, 10},
+                  "the same two radii from the middle of the patch; grows with the fourth power of nearness");
   settings.number("tip_floor_mm", p.tip_floor_mm, positive, "min. deviation of the tip's displacement");
   settings.number("tip_disparity_px", p.tip_disparity_px, positive, "the same along the viewing ray, of the disparity");
   settings.number("tip_dof", p.tip_dof, positive, "Student-t degrees of freedom of the tip");

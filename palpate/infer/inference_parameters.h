@@ -7,15 +7,16 @@ namespace palpate {
 /// Every number that the inference decides by (docs/inference.md says where each comes from).
 struct InferenceParameters {
   // What is measured, and how well.
-  double point_px = 0.12;          ///< deviation of a tracked point in one camera, px
+  double point_px = 0.07;          ///< deviation of a tracked point in one camera, px
   double point_dof = 4;            ///< Student-t degrees of freedom of a point
   double effective_points = 25;    ///< effective sample size: more points share their errors with neighbours
   double motion_error = 0.04;      ///< error of the model's motion of a point, ratio to that motion
   double far_motion_error = 0.6;   ///< the same as far from the patch as its attachments; grows with the square
+  double rim_motion_error = 0.07;  ///< the same at two radii from the middle of the patch; fourth power of nearness
   double tip_floor_mm = 0.05;      ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
-  double excluded_radii = 2.2;     ///< points nearer to a patch than so many radii carry its rim's model error
+  double excluded_radii = 1.2;     ///< points nearer to a patch than so many radii are left out
 
   // What is not known beforehand: one standard deviation.
   double scene_mm = 15, scene_rad = 0.1;            ///< rigid motion of the scene since the map
@@ -23,13 +24,13 @@ struct InferenceParameters {
   double disparity_bias_px = 0.05;                  ///< common to all points of a frame
   double hand_mm_per_s = 40;                        ///< speed of a hand: walk of the patch, and of a free tip
   double log_radius = 0.7;                          ///< of the patch's radius: a factor of two
-  double stated_radius = 0.15;                      ///< the same where the stated one is right (Cauchy)
-  double tissue_radius = 0.1;  ///< of the log radius that the tissue tells: the model's error far from the patch
+  double stated_radius = 0.1;                       ///< the same where the stated one is right (Cauchy)
+  double tissue_radius = 0.05; ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
   double skew = 0.05;                                   ///< common error of the model's motion of all tissue, ratio
-  double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
+  double offset_walk_mm = 0.05, log_radius_walk = 0.5;  ///< the same, per square root of a second
   double telling_force = 5;                             ///< the radius is learned where the force is so many deviations
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.

@@ -24,14 +24,17 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
 }
 
 /// Ratio of the error of the model's motion of a point to that motion. Near a patch the tissue answers as a half-space would; as far
-/// from it as its attachments are, all that is not known of the body counts (Saint-Venant).
+/// from it as its attachments are, all that is not known of the body counts (Saint-Venant); at its rim, what is not known
+/// of the patch.
 double motion_error(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (size_t k = 0; body.model && k < body.model->contact_count(); ++k)
-    nearest = std::min(nearest, (point.rest_mm - body.model->footprint(k).center_mm).norm() /
-                                    body.model->distance_to_attachments_mm(k));
-  if (std::isinf(nearest)) return parameters.motion_error;
-  return std::hypot(parameters.motion_error, parameters.far_motion_error * nearest * nearest);
+  double far = std::numeric_limits<double>::infinity(), rim = 0;
+  for (size_t k = 0; body.model && k < body.model->contact_count(); ++k) {
+    const double distance_mm = (point.rest_mm - body.model->footprint(k).center_mm).norm();
+    far = std::min(far, std::pow(distance_mm / body.model->distance_to_attachments_mm(k), 2));
+    rim = std::max(rim, std::pow(2 * body.model->radius_mm(k) / distance_mm, 4));
+  }
+  if (std::isinf(far)) return parameters.motion_error;
+  return std::hypot(parameters.motion_error, parameters.far_motion_error * far, parameters.rim_motion_error * rim);
 }
 
 /// dx/d(unknowns) of the point of the body now at R (X + u - about), for a displacement with these derivatives.
