@@ -28,6 +28,7 @@ struct FitContext {
   Vec3 about_mm = Vec3::Zero();
   bool tissue_drives = true;  ///< false: the tip alone (contact.drive: tip)
   double stated_log_radius = 0;
+  std::vector<PatchReach> patches = {};  ///< of each contact
 };
 
 /// Eq. 3 as last solved: the point around which a fit begins.

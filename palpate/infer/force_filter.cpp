@@ -85,7 +85,7 @@ struct ForceFilter::State {
   std::vector<Hand> hands;
   std::vector<size_t> instrument_of_contact;
   std::optional<SolvedBody> body;
-  int places_version = -1;
+  std::vector<PatchReach> patches;  ///< as believed before the frame
 
   State(ContactModel m, const AttachedMesh& map, std::vector<TissuePoint> p, const Rectification& r,
         const ContactOptions& o, const InferenceParameters& q)
@@ -106,13 +106,27 @@ struct ForceFilter::State {
     const bool settles = std::any_of(hands.begin(), hands.end(), [this](const Hand& hand) {
       return hand.contact && last_time_s - hand.onset_s < kSettling_s;
     });
-    return {rectification, parameters, about_mm, options.drive == Drive::fused || settles, stated_log_radius()};
+    return {rectification, parameters, about_mm, options.drive == Drive::fused || settles, stated_log_radius(), patches};
   }
 
   double stated_log_radius() const { return std::log(options.footprint_radius_mm); }
 
-  /// Tissue nearer to a patch than this carries the model error of its rim.
-  double excluded_mm(size_t contact) const { return parameters.excluded_radii * std::exp(belief.log_radius(contact)); }
+  /// Where the model is believed to be right, as of `prior`.
+  std::vector<PatchReach> reaches(const Belief& prior) const {
+    std::vector<PatchReach> result;
+    for (size_t k = 0; k < model.contact_count(); ++k) {
+      const Eigen::Index at = Unknowns::log_radius(k);
+      const double deviation = std::min(parameters.log_radius, std::sqrt(prior.covariance(at, at)));
+      result.push_back({model.footprint(k).center_mm, std::exp(std::log(model.radius_mm(k)) - deviation),
+                        model.distance_to_attachments_mm(k)});
+    }
+    return result;
+  }
+
+  /// Tissue nearer to a patch than this moves with it, whatever the model says.
+  double excluded_mm(size_t contact) const {
+    return parameters.excluded_radii * (contact < patches.size() ? patches[contact].rim_mm : model.radius_mm(contact));
+  }
 
   /// The points on the body that no patch's rim disturbs; the same for every hypothesis of the frame.
   std::vector<TissuePoint> usable(const std::vector<TissuePoint>& seen) const {
@@ -320,7 +334,7 @@ struct ForceFilter::State {
     std::erase_if(without.tips, [k](const ContactTip& t) { return t.contact == k; });
     for (ContactTip& t : without.tips) t.contact -= t.contact > k;
     // Every hypothesis is scored with the same noise.
-    const PredictedBody held{&body->response, &body->places, body->unknowns(tied.posterior), about_mm, &model};
+    const PredictedBody held{&body->response, &body->places, body->unknowns(tied.posterior), about_mm, &patches};
     for (TissuePoint& point : without.tissue) point.model_mm = model_error_mm(point, held, parameters);
     const Belief free_prior = without_contact(prior, k);
     const ContactFit free =
@@ -424,7 +438,7 @@ struct ForceFilter::State {
   /// is explained.
   double misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {
     PredictedBody predicted{nullptr, nullptr, at.mean, about_mm};
-    if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm, &model};
+    if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm, &patches};
     const std::vector<Measurement> rows = tissue_measurements(data.tissue, predicted, rectification, parameters);
     std::vector<double> misfits;
     size_t unexplained = 0;
@@ -444,7 +458,6 @@ struct ForceFilter::State {
   /// Radius and place of the patch as believed by now.
   void renew_patch(size_t instrument, const ContactFit& fit) {
     Hand& hand = hands[instrument];
-    if (hand.filter.most_probable() == Hold::free) return;
     const size_t k = *hand.contact;
     const ForceAt force = force_at(*body, fit.posterior, k);
     const double deviation_N = std::sqrt(force_covariance(force, fit).trace() / 3);
@@ -524,6 +537,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
   for (Hand& hand : s.hands)
     if (hand.contact) hand.filter.predict(seconds, s.parameters);
 
+  s.patches = s.reaches(prior);
   FrameData data;
   data.tissue = s.usable(frame.tissue);
   data.seconds = seconds;

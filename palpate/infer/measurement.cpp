@@ -28,12 +28,12 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
 /// of the patch.
 double motion_error(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
   double far = std::numeric_limits<double>::infinity(), rim = 0;
-  for (size_t k = 0; body.model && k < body.model->contact_count(); ++k) {
-    const double distance_mm = (point.rest_mm - body.model->footprint(k).center_mm).norm();
-    far = std::min(far, std::pow(distance_mm / body.model->distance_to_attachments_mm(k), 2));
-    rim = std::max(rim, std::pow(2 * body.model->radius_mm(k) / distance_mm, 4));
+  if (!body.patches || body.patches->empty()) return parameters.motion_error;
+  for (const PatchReach& patch : *body.patches) {
+    const double distance_mm = (point.rest_mm - patch.center_mm).norm();
+    far = std::min(far, std::pow(distance_mm / patch.attachments_mm, 2));
+    rim = std::max(rim, std::pow(2 * patch.rim_mm / distance_mm, 4));
   }
-  if (std::isinf(far)) return parameters.motion_error;
   return std::hypot(parameters.motion_error, parameters.far_motion_error * far, parameters.rim_motion_error * rim);
 }
 

@@ -20,13 +20,20 @@ struct SurfacePlace {
 std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, const std::vector<Vec3>& nodes_mm,
                                     const std::vector<Triangle>& boundary);
 
+/// How near to a patch, and how far from it, the model of its motion is right.
+struct PatchReach {
+  Vec3 center_mm = Vec3::Zero();  ///< at rest
+  double rim_mm = 0;              ///< radius of the patch, the smallest that is likely
+  double attachments_mm = 0;      ///< how far they are
+};
+
 /// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.
 struct PredictedBody {
   const ContactResponse* response = nullptr;
   const std::vector<SurfacePlace>* places = nullptr;  ///< by number of the point
   Eigen::VectorXd x0;                                 ///< unknowns at which the response was computed
   Vec3 about_mm = Vec3::Zero();                       ///< of the scene's motion
-  const ContactModel* model = nullptr;                ///< says how far a point is from the patches, in effect
+  const std::vector<PatchReach>* patches = nullptr;   ///< where the model is right; nullptr = everywhere alike
 
   /// Displacement of a point at x0, mm; its derivative by the displacement of one patch.
   Vec3 displacement_mm(const TissuePoint& point) const;
