@@ -44,7 +44,7 @@ struct InferenceParameters {
   double inside_mm = 10;          ///< how deep such a tip may be
 
   // The band.
-  double model_error = 0.05;  ///< of the force, ratio to it: what the model's form leaves
+  double model_error = 0.03;  ///< of the force, ratio to it: what the model's form leaves
 };
 
 void describe(Settings& settings, InferenceParameters& parameters);

@@ -112,11 +112,13 @@ bool shines(const cv::Mat& bgr, const cv::Point2f& p, double white) {
 }
 
 double correlation(const cv::Mat& a, const cv::Point2f& pa, const cv::Mat& b, const cv::Point2f& pb) {
-  cv::Mat wa, wb, result;
-  cv::getRectSubPix(a, {kCompared_px, kCompared_px}, pa, wa);
-  cv::getRectSubPix(b, {kCompared_px, kCompared_px}, pb, wb);
-  cv::matchTemplate(wa, wb, result, cv::TM_CCOEFF_NORMED);
-  return result.at<float>(0, 0);
+  cv::Mat wa, wb;
+  cv::getRectSubPix(a, {kCompared_px, kCompared_px}, pa, wa, CV_32F);
+  cv::getRectSubPix(b, {kCompared_px, kCompared_px}, pb, wb, CV_32F);
+  wa -= cv::mean(wa);
+  wb -= cv::mean(wb);
+  const double scale = cv::norm(wa) * cv::norm(wb);
+  return scale > 0 ? wa.dot(wb) / scale : 0;
 }
 
 /// What is unlike in two windows shifts their match in proportion.
