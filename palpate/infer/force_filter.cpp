@@ -47,6 +47,8 @@ double log_normal3(const Vec3& x, const Mat3& covariance) {
          (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
 }
 
+/// A tip inside the body may be a wrong one: the next frame's tissue has to confirm that it holds.
+constexpr double kUnconfirmed = 0.4;
 /// A place that the operator names is held with this probability, until the tissue says so.
 constexpr double kHeldUntold = 0.02;
 
@@ -263,7 +265,7 @@ struct ForceFilter::State {
     const double probability = 1 / (1 + std::exp(-log_odds));
     if (probability < 0.5) return;
     begin(instrument, tip, gap, evidence.unnoticed && !closes);
-    hand.filter.touch(probability);
+    hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, kUnconfirmed) : probability);
     answer.begins = true;
   }
 
@@ -372,12 +374,16 @@ struct ForceFilter::State {
 
   /// What a contact that is more probably none says about its slow unknowns is not learned.
   static void keep_slow(const Belief& from, size_t contact, Belief& to) {
-    const Eigen::Index at = Unknowns::offset(contact);
-    constexpr Eigen::Index kSlow = Unknowns::kContact - 3;
-    to.mean.segment<kSlow>(at) = from.mean.segment<kSlow>(at);
-    to.covariance.middleRows<kSlow>(at).setZero();
-    to.covariance.middleCols<kSlow>(at).setZero();
-    to.covariance.block<kSlow, kSlow>(at, at) = from.covariance.block<kSlow, kSlow>(at, at);
+    forget(from, Unknowns::offset(contact), Unknowns::kContact - 3, to);
+  }
+
+  /// Some unknowns as they were believed before.
+  static void forget(const Belief& before, Eigen::Index at, Eigen::Index count, Belief& now) {
+    if (before.mean.size() != now.mean.size()) return;
+    now.mean.segment(at, count) = before.mean.segment(at, count);
+    now.covariance.middleRows(at, count).setZero();
+    now.covariance.middleCols(at, count).setZero();
+    now.covariance.block(at, at, count, count) = before.covariance.block(at, at, count, count);
   }
 
   bool is_near_its_patch(const TipObservation& tip, const Belief& free, size_t contact) const {
@@ -455,8 +461,8 @@ struct ForceFilter::State {
     return *middle;
   }
 
-  /// Radius and place of the patch as believed by now.
-  void renew_patch(size_t instrument, const ContactFit& fit) {
+  /// Radius and place of the patch as believed by now. A weak force says nothing of the radius.
+  void renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit) {
     Hand& hand = hands[instrument];
     const size_t k = *hand.contact;
     const ForceAt force = force_at(*body, fit.posterior, k);
@@ -464,7 +470,10 @@ struct ForceFilter::State {
     // Learned without the operator's word, which each fit hears anew; the patch is laid as it is believed with it.
     double& learned = belief.mean[Unknowns::log_radius(k)];
     double log_radius = fit.posterior.log_radius(k);
-    if (force.force_N.norm() < parameters.telling_force * deviation_N) return;
+    if (force.force_N.norm() < parameters.telling_force * deviation_N) {
+      forget(prior, Unknowns::log_radius(k), 1, belief);
+      return;
+    }
     learned = std::clamp(learned, stated_log_radius() + std::log(parameters.min_radius_ratio),
                          stated_log_radius() + std::log(parameters.max_radius_ratio));
     log_radius = std::clamp(log_radius, stated_log_radius() + std::log(parameters.min_radius_ratio),
@@ -583,7 +592,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
   });
   if (s.body && any_touches) answer.equilibrium = s.body->response.equilibrium;
   if (fit.converged)
-    for (size_t instrument : std::vector<size_t>(s.instrument_of_contact)) s.renew_patch(instrument, fit);
+    for (size_t instrument : std::vector<size_t>(s.instrument_of_contact)) s.renew_patch(instrument, prior, fit);
   for (size_t i = 0; i < s.hands.size(); ++i) {
     const TipObservation& tip = frame.tips[i];
     Hand& hand = s.hands[i];
@@ -594,7 +603,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     }
     if (!hand.contact && frame.may_touch) {
       s.look_for_touch(i, tip, seconds, answer.instruments[i]);
-      if (hand.contact) {
+      if (hand.contact && hand.filter.most_probable() != Hold::free) {
         fit.posterior = fit.kept = s.belief;
         fit.converged = s.body->response.equilibrium.converged;
         s.report(i, fit, tip, answer.instruments[i]);

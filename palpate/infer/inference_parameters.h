@@ -12,7 +12,7 @@ struct InferenceParameters {
   double effective_points = 25;    ///< effective sample size: more points share their errors with neighbours
   double motion_error = 0.04;      ///< error of the model's motion of a point, ratio to that motion
   double far_motion_error = 0.6;   ///< the same as far from the patch as its attachments; grows with the square
-  double rim_motion_error = 0.07;  ///< the same at two radii from the middle of the patch; fourth power of nearness
+  double rim_motion_error = 0.1;   ///< the same at two radii from the middle of the patch; fourth power of nearness
   double tip_floor_mm = 0.05;      ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
@@ -31,7 +31,7 @@ struct InferenceParameters {
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
   double skew = 0.05;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.5;  ///< the same, per square root of a second
-  double telling_force = 5;                             ///< the radius is learned where the force is so many deviations
+  double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.
   double touch_per_s = 0.5;    ///< a free tip begins to touch
