@@ -72,7 +72,17 @@ void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size
       around.tl().x, around.tl().y, around.br().x - 1, around.br().y - 1, size.width, size.height));
 }
 
-std::string run_yaml(SceneFile scene_file, const Rectification& rectification) {
+/// Of the frame with the greatest force: force over E, and its band.
+Vec3 peak_per_modulus(const std::vector<ForceRow>& rows, const TissueOptions& tissue) {
+  const auto peak = std::max_element(rows.begin(), rows.end(), [](const ForceRow& a, const ForceRow& b) {
+    return a.force_magnitude_N < b.force_magnitude_N;
+  });
+  if (peak == rows.end() || !(peak->force_magnitude_N > 0)) return Vec3::Zero();
+  return Vec3(peak->force_magnitude_N, peak->force_low_N, peak->force_high_N) / tissue.young_modulus_kPa;
+}
+
+std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows = {}) {
+  scene_file.peak_force_per_modulus_N_per_kPa = peak_per_modulus(rows, scene_file.scene.tissue);
   scene_file.has_run = scene_file.scene.has_tuning = true;
   scene_file.rectified_from_left = rectification.rectified_from_left;
   return fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
@@ -174,7 +184,8 @@ struct RunFiles {
       for (ForceRow& row : *truth) row.time_s = row.frame / built.fps;
     report.times = times;
     report.tissue = scene_file.scene.tissue;
-    report.settings = run_yaml(scene_file, built.rectification);
+    report.settings = run_yaml(scene_file, built.rectification, rows);
+    write_text(options.folder / "run.yaml", report.settings);
     report.pictures = pictures.chosen();
     write_report(options.folder / "report.html", report);
   }
@@ -209,6 +220,7 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
     summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);
     ++summary.frames_by_status[row.status];
   }
+  summary.peak_force_per_modulus_N_per_kPa = peak_per_modulus(files.rows, summary.tissue);
   summary.frames_by_warning = count_warnings(files.rows);
   if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_truth(files.options.truth));
   for (const ForceRow& row : files.forces_2.rows())
@@ -235,10 +247,6 @@ std::string text_of_comparison(const Comparison& c) {
   line("false contact", fmt::format("{} frames", c.false_contact_frames));
   if (c.tip_rmse_mm) line("tip RMSE", fmt::format("{:.2f} mm", *c.tip_rmse_mm));
   return text;
-}
-
-double force_per_modulus_N_per_kPa(const RunSummary& summary) {
-  return summary.tissue.young_modulus_kPa > 0 ? summary.peak_force_N / summary.tissue.young_modulus_kPa : 0;
 }
 
 ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built) {
@@ -380,7 +388,8 @@ std::string to_text(const RunSummary& summary) {
   const TissueOptions& tissue = summary.tissue;
   line("tissue assumed", fmt::format("{}, E {} {}, nu = {:g}", law_name(tissue.law), tissue.modulus_unknown ? "is" : "=",
                                      modulus_text(tissue), tissue.poisson_ratio));
-  const std::string ratio = fmt::format("{:.3g} N per kPa of E", force_per_modulus_N_per_kPa(summary));
+  const Vec3& ratios = summary.peak_force_per_modulus_N_per_kPa;
+  const std::string ratio = fmt::format("{:.3g} N per kPa of E (95 %: {:.3g} to {:.3g})", ratios[0], ratios[1], ratios[2]);
   line("peak force",
        tissue.modulus_unknown ? ratio : fmt::format("{:.2f} N, that is {}", summary.peak_force_N, ratio));
   if (summary.frames_by_status.count("tool_lost") && summary.frames_by_status.size() == 1)
@@ -412,7 +421,9 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["stage_draw_ms"] = summary.stages.draw_ms;
   json["tissue"] = tissue_json(summary.tissue);
   json["peak_force_N"] = summary.peak_force_N;
-  json["peak_force_per_modulus_N_per_kPa"] = force_per_modulus_N_per_kPa(summary);
+  json["peak_force_per_modulus_N_per_kPa"] = summary.peak_force_per_modulus_N_per_kPa[0];
+  json["peak_force_per_modulus_low_N_per_kPa"] = summary.peak_force_per_modulus_N_per_kPa[1];
+  json["peak_force_per_modulus_high_N_per_kPa"] = summary.peak_force_per_modulus_N_per_kPa[2];
   if (summary.peak_force_2_N) json["peak_force_2_N"] = *summary.peak_force_2_N;
   if (summary.comparison) json["comparison"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison));
   if (summary.comparison_2)

@@ -27,6 +27,7 @@ struct RunSummary {
   double p99_frame_ms = 0;
   FrameTimes stages;  ///< median of each, of the frames in contact where there are any
   double peak_force_N = 0;
+  Vec3 peak_force_per_modulus_N_per_kPa = Vec3::Zero();  ///< with its 95 % band from the images: value, low, high
   std::map<std::string, int> frames_by_status;
   std::map<std::string, int> frames_by_warning;
   std::optional<Comparison> comparison;

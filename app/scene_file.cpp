@@ -22,6 +22,8 @@ void describe(Settings& settings, SceneFile& scene_file) {
       [&scene_file](Settings& group) {
         group.matrix3("rectified_from_left", scene_file.rectified_from_left,
                       "axes of the rectified pair in the left camera frame, row by row");
+        group.vector3("peak_force_per_modulus_N_per_kPa", scene_file.peak_force_per_modulus_N_per_kPa, {0, 1e9},
+                      "greatest force over E, and its 95 % band: [value, low, high]");
       },
       &scene_file.has_run);
 }

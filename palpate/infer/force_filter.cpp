@@ -47,6 +47,8 @@ double log_normal3(const Vec3& x, const Mat3& covariance) {
          (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
 }
 
+/// log ratio of what is told, not seen.
+constexpr double kSure = 10;
 /// A tip inside the body may be a wrong one: the next frame's tissue has to confirm that it holds.
 constexpr double kUnconfirmed = 0.4;
 /// A place that the operator names is held with this probability, until the tissue says so.
@@ -261,7 +263,7 @@ struct ForceFilter::State {
     if (hand.released_at_mm && !evidence.unnoticed) return;
     const double rate = 1 - std::exp(-parameters.touch_per_s * seconds);
     double log_odds = std::log(rate / (1 - rate)) + evidence.log_ratio;
-    if (closes) log_odds = 10;
+    if (closes) log_odds = kSure;
     const double probability = 1 / (1 + std::exp(-log_odds));
     if (probability < 0.5) return;
     begin(instrument, tip, gap, evidence.unnoticed && !closes);
@@ -344,6 +346,8 @@ struct ForceFilter::State {
     ByHold log_likelihood{};
     log_likelihood[static_cast<size_t>(Hold::free)] =
         free.log_evidence + log_free_tip(instrument, tip, free.posterior, data.seconds);
+    // Jaws that are known to be closed on tissue are not free of it.
+    if (tip.closed.value_or(false)) log_likelihood[static_cast<size_t>(Hold::free)] = tied.log_evidence - kSure;
     log_likelihood[static_cast<size_t>(Hold::grasp)] = tied.log_evidence;
     const ForceAt force = force_at(*body, tied.posterior, k);
     const Vec3 normal = model.footprint(k).normal;
