@@ -39,8 +39,8 @@ std::string contact_times(const std::vector<ForceRow>& rows) {
 }
 
 MeasuredModulus with_band(double young_modulus_kPa, double log_half_width, size_t frames, std::string measured) {
-  return {young_modulus_kPa, young_modulus_kPa * std::exp(-log_half_width), young_modulus_kPa * std::exp(log_half_width),
-          static_cast<int>(frames), std::move(measured)};
+  return {young_modulus_kPa, young_modulus_kPa * std::exp(-log_half_width),
+          young_modulus_kPa * std::exp(log_half_width), static_cast<int>(frames), std::move(measured)};
 }
 
 /// Where a scalar of the file begins in its text; the file may begin with a byte order mark.
@@ -62,7 +62,8 @@ KnownForce parse_known_force(const std::string& text) {
   char rest = 0;
   if (std::sscanf(text.c_str(), "%lf@%lf%c", &known.force_N, &known.time_s, &rest) != 2 || !(known.force_N > 0) ||
       !std::isfinite(known.force_N) || !std::isfinite(known.time_s))
-    throw WrongUse(fmt::format("--known-force is '{}', expected force in N and time of the video in s, as in 1.5@3.2", text));
+    throw WrongUse(
+        fmt::format("--known-force is '{}', expected force in N and time of the video in s, as in 1.5@3.2", text));
   return known;
 }
 
@@ -84,8 +85,8 @@ MeasuredModulus modulus_from_known_force(const std::vector<ForceRow>& estimated,
 MeasuredModulus modulus_from_sensor(const std::vector<ForceRow>& estimated, double assumed_kPa,
                                     const std::filesystem::path& log) {
   if (std::none_of(estimated.begin(), estimated.end(), is_loaded))
-    throw BadInput(fmt::format("the estimate has no force to compare {} with: {}", log.string(),
-                               contact_times(estimated)));
+    throw BadInput(
+        fmt::format("the estimate has no force to compare {} with: {}", log.string(), contact_times(estimated)));
   const double span_s = estimated.back().time_s - estimated.front().time_s;
   const SensorComparison found = compare_with_sensor(estimated, read_sensor_log(log, span_s));
   double peak_N = 0;
@@ -118,9 +119,9 @@ std::string with_modulus(const std::string& scene_text, double young_modulus_kPa
     size_t end = place_in(text, entry.second) + entry.second.Scalar().size();
     if (end < text.size() && (text[end] == '"' || text[end] == '\'')) ++end;
     const bool flow = tissue.Style() == YAML::EmitterStyle::Flow;
-    const std::string between =
-        flow ? ", " : "\n" + std::string(static_cast<size_t>(entry.first.Mark().column), ' ');
-    const std::string ratio = tissue["poisson_ratio"] ? "" : fmt::format("{}poisson_ratio: {:g}", between, poisson_ratio);
+    const std::string between = flow ? ", " : "\n" + std::string(static_cast<size_t>(entry.first.Mark().column), ' ');
+    const std::string ratio =
+        tissue["poisson_ratio"] ? "" : fmt::format("{}poisson_ratio: {:g}", between, poisson_ratio);
     return text.replace(begin, end - begin, fmt::format("young_modulus_kPa: {}{}", modulus, ratio));
   }
   throw BadInput("tissue names neither young_modulus_kPa nor a preset");

@@ -22,7 +22,7 @@ KnownForce parse_known_force(const std::string& text);
 struct MeasuredModulus {
   double young_modulus_kPa = 0;
   double low_kPa = 0, high_kPa = 0;
-  int frames = 0;  ///< that it rests on
+  int frames = 0;        ///< that it rests on
   std::string measured;  ///< "1.5 N at 3.2 s", "log.csv, clock +0.31 s, correlation 0.98"
 };
 

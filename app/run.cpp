@@ -50,8 +50,7 @@ auto in_scene(const SceneFile& scene_file, const std::string& key, const Stage& 
     const std::string sentence = error.what();
     const auto names = [&sentence](const char* group) { return sentence.starts_with(group); };
     const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument") ||
-                           names("contact.") ||
-                           names("uncertainty");
+                           names("contact.") || names("uncertainty");
     const std::filesystem::path& volume = scene_file.scene.map.volume;
     const std::string told = names_key                                                  ? ""
                              : !volume.empty() && sentence.starts_with(volume.string()) ? "map.volume: "
@@ -362,8 +361,9 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
     while (auto frame = recording.next()) {
       const ForceEstimate estimate = estimator.update(*frame);
       files.add(*frame, estimate);
-      progress.show(frame->index + 1, recording.frame_count(),
-                    fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
+      progress.show(
+          frame->index + 1, recording.frame_count(),
+          fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
       if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
     }
   } catch (const Unfinished& reason) {
@@ -386,12 +386,12 @@ std::string to_text(const RunSummary& summary) {
   line("time per frame",
        fmt::format("{:.1f} ms median, {:.1f} ms for 99 %", summary.median_frame_ms, summary.p99_frame_ms));
   const TissueOptions& tissue = summary.tissue;
-  line("tissue assumed", fmt::format("{}, E {} {}, nu = {:g}", law_name(tissue.law), tissue.modulus_unknown ? "is" : "=",
-                                     modulus_text(tissue), tissue.poisson_ratio));
+  line("tissue assumed", fmt::format("{}, E {} {}, nu = {:g}", law_name(tissue.law),
+                                     tissue.modulus_unknown ? "is" : "=", modulus_text(tissue), tissue.poisson_ratio));
   const Vec3& ratios = summary.peak_force_per_modulus_N_per_kPa;
-  const std::string ratio = fmt::format("{:.3g} N per kPa of E (95 %: {:.3g} to {:.3g})", ratios[0], ratios[1], ratios[2]);
-  line("peak force",
-       tissue.modulus_unknown ? ratio : fmt::format("{:.2f} N, that is {}", summary.peak_force_N, ratio));
+  const std::string ratio =
+      fmt::format("{:.3g} N per kPa of E (95 %: {:.3g} to {:.3g})", ratios[0], ratios[1], ratios[2]);
+  line("peak force", tissue.modulus_unknown ? ratio : fmt::format("{:.2f} N, that is {}", summary.peak_force_N, ratio));
   if (summary.frames_by_status.count("tool_lost") && summary.frames_by_status.size() == 1)
     line("instrument", "not seen in any frame");
   for (const auto& [name, frames] : summary.frames_by_warning)

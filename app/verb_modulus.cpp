@@ -72,9 +72,9 @@ void add_modulus(CLI::App& app) {
     if (arguments->write) with_modulus(read_text(arguments->scene), 1, tissue.poisson_ratio);
     scene_file.scene.uncertainty.young_modulus_factor = 1;  // it is what is asked
     const std::vector<ForceRow> rows = estimate_rows(scene_file, arguments->json);
-    const MeasuredModulus found =
-        arguments->sensor.empty() ? modulus_from_known_force(rows, tissue.young_modulus_kPa, known)
-                                  : modulus_from_sensor(rows, tissue.young_modulus_kPa, arguments->sensor);
+    const MeasuredModulus found = arguments->sensor.empty()
+                                      ? modulus_from_known_force(rows, tissue.young_modulus_kPa, known)
+                                      : modulus_from_sensor(rows, tissue.young_modulus_kPa, arguments->sensor);
     std::filesystem::path written = arguments->scene;
     written.replace_extension(".modulus.yaml");
     replace_file(written, modulus_yaml(found, tissue));

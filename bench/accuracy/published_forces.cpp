@@ -25,14 +25,14 @@ constexpr double kGoalPct = 8;  // what the authors' own script gives on these f
 constexpr int kFrames[] = {10, 20, 30, 40, 49};
 constexpr int kVtkTetrahedron = 10;
 
-constexpr double kPoint_mm = 0.5;    // deviation of a point from the surface: the two meshes differ
-constexpr double kPointDof = 4;      // of its Student-t density
-constexpr double kLoad_N = 10;       // prior deviation of the resultant, each axis
-constexpr double kUneven = 0.5;      // of a load's change over the region, over the load
-constexpr int kLoads = 12;           // resultant, and its change along x, y, z of the region
+constexpr double kPoint_mm = 0.5;  // deviation of a point from the surface: the two meshes differ
+constexpr double kPointDof = 4;    // of its Student-t density
+constexpr double kLoad_N = 10;     // prior deviation of the resultant, each axis
+constexpr double kUneven = 0.5;    // of a load's change over the region, over the load
+constexpr int kLoads = 12;         // resultant, and its change along x, y, z of the region
 constexpr int kMaxIterations = 40;
 constexpr double kSettled_N = 1e-3;
-constexpr int kCandidates = 150;     // regions that are searched
+constexpr int kCandidates = 150;  // regions that are searched
 
 struct Liver {
   TetMesh mesh;
@@ -202,8 +202,9 @@ int run() {
   std::vector<Region> candidates;
   for (const std::vector<int>& nodes : candidate_regions(liver, body)) candidates.push_back(body.loaded(nodes));
 
-  fmt::print("| frame | true force N | estimated N | error % | 95 % band of the magnitude N | region searched: error % | "
-             "its distance mm |\n|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| frame | true force N | estimated N | error % | 95 % band of the magnitude N | region searched: error % | "
+      "its distance mm |\n|---|---|---|---|---|---|---|\n");
   double sum_pct = 0, searched_pct = 0;
   for (const int frame : kFrames) {
     const std::vector<Vec3> points_mm =
@@ -245,8 +246,9 @@ int run() {
     sum_pct += error_pct(found) / std::size(kFrames);
     searched_pct += error_pct(best) / std::size(kFrames);
   }
-  fmt::print("mean error {:.1f} % with the region known (goal < {:g} %, the authors' script), {:.1f} % with it searched\n",
-             sum_pct, kGoalPct, searched_pct);
+  fmt::print(
+      "mean error {:.1f} % with the region known (goal < {:g} %, the authors' script), {:.1f} % with it searched\n",
+      sum_pct, kGoalPct, searched_pct);
   return 0;
 }
 

@@ -15,9 +15,10 @@ void describe(Settings& settings, ContactOptions& options) {
   settings.choice<Drive>("drive", options.drive, {{"fused", Drive::fused}, {"tip", Drive::tip}},
                          "fused: tip and tissue in one estimate, radius and scene motion unknown; tip: the paper's "
                          "way, the tip's displacement with the radius as stated");
-  settings.points("at_px", options.at_px,
-                  "[x, y] in the left image as recorded, where the tissue is held: force from the visible surface alone, "
-                  "with instrument.segmentation: none");
+  settings.points(
+      "at_px", options.at_px,
+      "[x, y] in the left image as recorded, where the tissue is held: force from the visible surface alone, "
+      "with instrument.segmentation: none");
   settings.integer("at_frame", options.at_frame, {-1, 1e9},
                    "frame in which it is taken hold of there; -1: when the tissue says so");
   settings.after_reading([&options] {

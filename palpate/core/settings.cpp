@@ -160,8 +160,8 @@ void Settings::number_or_word(const std::string& key, double& field, Range range
   number(key, field, range, doc);
   Entry& entry = *entries_.back();
   entry.range = fmt::format("{}, or {}", range.text(), word);
-  entry.read = [&field, &is_word, range, word](const YAML::Node& node, const SettingsContext&,
-                                               const std::string& place, const std::string&) {
+  entry.read = [&field, &is_word, range, word](const YAML::Node& node, const SettingsContext&, const std::string& place,
+                                               const std::string&) {
     double value = 0;
     is_word = node.IsScalar() && node.Scalar() == word;
     if (is_word) return;
@@ -392,8 +392,8 @@ void Settings::choices_by_index(const std::string& key, const std::vector<std::s
   entry->read = [names, set](const YAML::Node& node, const SettingsContext&, const std::string& place,
                              const std::string&) {
     if (!node.IsSequence())
-      throw BadInput(fmt::format("{} is {}, expected a list [..] of: {}", place, written(node),
-                                 fmt::join(names, ", ")));
+      throw BadInput(
+          fmt::format("{} is {}, expected a list [..] of: {}", place, written(node), fmt::join(names, ", ")));
     std::vector<int> indices;
     for (const YAML::Node& item : node) {
       const auto found = std::find(names.begin(), names.end(), item.IsScalar() ? item.Scalar() : "");

@@ -85,8 +85,8 @@ class Settings {
 
   /// Words out of a list, [] for none.
   template <class Enum>
-  void choices(const std::string& key, std::vector<Enum>& field,
-               const std::vector<std::pair<std::string, Enum>>& words, const std::string& doc) {
+  void choices(const std::string& key, std::vector<Enum>& field, const std::vector<std::pair<std::string, Enum>>& words,
+               const std::string& doc) {
     std::vector<std::string> names;
     for (const auto& word : words) names.push_back(word.first);
     choices_by_index(

@@ -23,11 +23,12 @@ struct TissueOptions {
   Law law = Law::saint_venant_kirchhoff;
   double young_modulus_kPa = 0;
   double poisson_ratio = 0.45;
-  bool modulus_unknown = false;  ///< E is 1 kPa then, forces are N per kPa, stress is a ratio to E
-  std::string preset;            ///< liver, uterus, ...; fills the two numbers above where they are not given
+  std::string preset;  ///< liver, uterus, ...; fills the two numbers above where they are not given
 
   /// Of the elements with label 1, 2, ...; elements with label 0, or with one that is not here, have the two above.
   std::vector<Stiffness> of_label = {};
+
+  bool modulus_unknown = false;  ///< E is 1 kPa then, forces are N per kPa, stress is a ratio to E
 
   double young_modulus_MPa() const { return young_modulus_kPa * 1e-3; }
 };

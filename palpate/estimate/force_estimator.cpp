@@ -7,8 +7,8 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
-#include "palpate/estimate/map_model.h"
 #include "palpate/elastic/stress.h"
+#include "palpate/estimate/map_model.h"
 #include "palpate/infer/band.h"
 #include "palpate/infer/force_filter.h"
 #include "palpate/observe/picture_quality.h"
@@ -37,8 +37,9 @@ std::optional<Vec3> place_at(const TissueMap& map, const Rectification& rectific
     place_mm = point_mm;
   }
   if (!place_mm)
-    throw BadInput(fmt::format("contact.at_px is [{:g}, {:g}], where no tissue was measured, expected a pixel of the organ",
-                               at_px.front().x, at_px.front().y));
+    throw BadInput(
+        fmt::format("contact.at_px is [{:g}, {:g}], where no tissue was measured, expected a pixel of the organ",
+                    at_px.front().x, at_px.front().y));
   return place_mm;
 }
 
@@ -69,8 +70,7 @@ struct ForceEstimator::State {
         instruments(instrument, r, rest, map.organ_mask),
         pictures(rest.left),
         tissue(rest, r, map.disparity.disparity_px, map.organ_mask & r.valid_left),
-        filter(contact_model(map, r, radius_mm), {map.mesh, map.fixed_nodes},
-               tissue.points(), r, contact, t) {}
+        filter(contact_model(map, r, radius_mm), {map.mesh, map.fixed_nodes}, tissue.points(), r, contact, t) {}
 
   /// One row of forces.csv. `tip_known`: seen, or told by the operator.
   void report(const InstrumentAnswer& answer, const FrameAnswer& whole, bool tip_known, ForceEstimate& estimate) {
@@ -101,8 +101,8 @@ struct ForceEstimator::State {
     estimate.force_N = answer.force_N;
     estimate.mean_nodal_force_N = answer.mean_nodal_force_N;
     estimate.band = force_band(answer.force_N, answer.force_covariance_N2);
-    estimate.total_band = total_band(estimate.band, answer.force_N.norm(),
-                                     uncertainty.log_deviation(answer.place_mm, answer.q_mm));
+    estimate.total_band =
+        total_band(estimate.band, answer.force_N.norm(), uncertainty.log_deviation(answer.place_mm, answer.q_mm));
     estimate.status = whole.explained ? FrameStatus::ok : FrameStatus::map_stale;
     const double half_width_N = 0.5 * (estimate.band.high_N - estimate.band.low_N);
     if (!answer.tip_inferred || half_width_N < 2 * kTellingDeviation * estimate.force_N.norm()) return;

@@ -39,8 +39,8 @@ std::vector<Vec3> spread_places(const std::vector<Vec3>& surface_mm) {
   while (places.size() < std::min(kPlaces, inner.size())) {
     for (size_t i = 0; i < inner.size(); ++i)
       distance_mm[i] = std::min(distance_mm[i], (inner[i] - places.back()).norm());
-    places.push_back(inner[static_cast<size_t>(std::max_element(distance_mm.begin(), distance_mm.end()) -
-                                               distance_mm.begin())]);
+    places.push_back(
+        inner[static_cast<size_t>(std::max_element(distance_mm.begin(), distance_mm.end()) - distance_mm.begin())]);
   }
   return places;
 }
@@ -105,8 +105,8 @@ double ForceUncertainty::log_deviation(const Vec3& at_rest_mm, const Vec3& q_mm)
     return (a.at_rest_mm - at_rest_mm).norm() < (b.at_rest_mm - at_rest_mm).norm();
   });
   const bool presses = q_mm.dot(place.normal) < 0;
-  const double law = (presses ? place.law_pressed : place.law_pulled) *
-                     std::min(q_mm.norm() / reference_mm, kMaxLawRatio);
+  const double law =
+      (presses ? place.law_pressed : place.law_pulled) * std::min(q_mm.norm() / reference_mm, kMaxLawRatio);
   return std::hypot(modulus, presses ? place.pressed : place.pulled, law);
 }
 
@@ -166,11 +166,9 @@ ForceUncertainty force_uncertainty(const TissueMap& map, const Rectification& re
 ForceBand total_band(const ForceBand& from_images, double force_N, double log_deviation) {
   const double more = kBandQuantile * log_deviation;
   if (!(force_N > 0)) return {0, from_images.high_N * std::exp(more)};
-  const auto widened = [more, force_N](double end_N) {
-    const double log_ratio = std::log(end_N / force_N);
-    return force_N * std::exp(std::copysign(std::hypot(log_ratio, more), log_ratio));
-  };
-  return {from_images.low_N > 0 ? widened(from_images.low_N) : 0, widened(std::max(from_images.high_N, force_N))};
+  const auto factor = [more](double ratio) { return std::exp(std::hypot(std::log(ratio), more)); };
+  const double low_N = from_images.low_N > 0 ? force_N / factor(force_N / from_images.low_N) : 0;
+  return {low_N, force_N * factor(std::max(from_images.high_N, force_N) / force_N)};
 }
 
 }  // namespace palpate

@@ -23,8 +23,8 @@ void describe(Settings& settings, UncertaintyOptions& options);
 struct ForceUncertainty {
   struct Place {
     Vec3 at_rest_mm = Vec3::Zero();
-    Vec3 normal = Vec3::UnitZ();       ///< outward
-    double pressed = 0, pulled = 0;    ///< by Poisson's ratio, thickness, attachments
+    Vec3 normal = Vec3::UnitZ();             ///< outward
+    double pressed = 0, pulled = 0;          ///< by Poisson's ratio, thickness, attachments
     double law_pressed = 0, law_pulled = 0;  ///< by the law, at a displacement of `reference_mm`
   };
   double modulus = 0;

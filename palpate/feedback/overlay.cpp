@@ -284,7 +284,8 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   }
 
   const double text_px = 14 * scale;
-  const std::string text = three_digits(force_N) + " " + force_unit(tissue_) + (estimate.status == FrameStatus::map_stale ? " ?" : "");
+  const std::string text =
+      three_digits(force_N) + " " + force_unit(tissue_) + (estimate.status == FrameStatus::map_stale ? " ?" : "");
   const cv::Point2d away = along_sight ? cv::Point2d(0, -1) : (head - tip) * (1 / cv::norm(head - tip));
   const int half = text_width(text, text_px, true) / 2 + px(4);
   const double gap = std::abs(away.x) * half + std::abs(away.y) * text_px + (along_sight ? 18 : 8) * scale;
@@ -330,9 +331,9 @@ void OverlayPainter::draw_frame(cv::Mat& image, const ForceEstimate& estimate) c
   const double scale = drawing_scale(image.size()), text_px = 8 * scale;
   const auto px = [scale](double size) { return cvRound(size * scale); };
   const double force_N = has_force(estimate) ? estimate.force_N.norm() : 0;
-  const std::string tissue =
-      fmt::format("{}, E {} {}, nu = {}, F/E = {} mm^2", law_name(tissue_.law), tissue_.modulus_unknown ? "is" : "=", modulus_text(tissue_),
-                  tick_text(tissue_.poisson_ratio), three_digits(force_N / tissue_.young_modulus_MPa()));
+  const std::string tissue = fmt::format(
+      "{}, E {} {}, nu = {}, F/E = {} mm^2", law_name(tissue_.law), tissue_.modulus_unknown ? "is" : "=",
+      modulus_text(tissue_), tick_text(tissue_.poisson_ratio), three_digits(force_N / tissue_.young_modulus_MPa()));
   const std::string purpose = "research use only";
   const bool two_lines = text_width(tissue, text_px) + text_width(purpose, text_px) + px(40) > image.cols;
   const int height = px(two_lines ? 34 : 20);

@@ -105,7 +105,9 @@ std::string cards(const Report& report, const std::optional<Comparison>& compari
   const double peak_N = peak == report.rows.end() ? 0 : peak->force_magnitude_N;
   std::string html = card(three_digits(peak_N) + " " + force_unit(report.tissue), "peak force");
   // Not the greatest stress of the run: in a frame where elements invert that number means nothing.
-  if (peak_N > 0) html += card(three_digits(peak->max_von_mises_kPa) + " " + stress_unit(report.tissue), "greatest von Mises stress then");
+  if (peak_N > 0)
+    html += card(three_digits(peak->max_von_mises_kPa) + " " + stress_unit(report.tissue),
+                 "greatest von Mises stress then");
   if (comparison) {
     html += card(comparison->force_nrmse_pct ? fmt::format("{:.1f} %", *comparison->force_nrmse_pct) : "-",
                  "force error (NRMSE, of the true peak)");
@@ -175,7 +177,8 @@ std::string force_section(const Report& report) {
       "<span><i class=\"ok\"></i>contact</span><span><i class=\"no_contact\"></i>no contact</span>"
       "<span><i class=\"doubt\"></i>lost, not converged or stale</span>";
   if (!report.truth.empty()) legend += "<span><i class=\"true_contact\"></i>true contact</span>";
-  return "<h2>Force over time</h2>\n<div class=\"legend\">" + legend + "</div>" + chart_html(chart, force_unit(report.tissue), 320) +
+  return "<h2>Force over time</h2>\n<div class=\"legend\">" + legend + "</div>" +
+         chart_html(chart, force_unit(report.tissue), 320) +
          fmt::format("<p class=\"faint\">{} frames ({})</p>\n", report.rows.size(), counts);
 }
 

@@ -75,8 +75,7 @@ Belief with_contact(const Belief& belief, const ContactPrior& prior) {
   next.covariance.block<3, 3>(before, before) = prior.q_covariance_mm2;
   next.covariance.block<3, 3>(before + 3, before + 3) = prior.offset_covariance_mm2;
   next.covariance(before + 6, before + 6) = prior.log_radius_deviation * prior.log_radius_deviation;
-  next.covariance.block<3, 3>(before + 7, before + 7) =
-      prior.skew_deviation * prior.skew_deviation * Mat3::Identity();
+  next.covariance.block<3, 3>(before + 7, before + 7) = prior.skew_deviation * prior.skew_deviation * Mat3::Identity();
   return next;
 }
 

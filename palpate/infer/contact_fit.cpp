@@ -111,7 +111,8 @@ ContactFit fit_contacts(const Belief& prior, const FrameData& data, SolvedBody& 
     body.q_mm = std::move(q_mm);
     for (size_t k = 0; k < prior.contacts(); ++k) body.log_radius[k] = std::log(model.radius_mm(k));
     // Linearized anew where this fit has led.
-    const PredictedBody predicted{&body.response, &body.places, body.unknowns(fit.posterior), context.about_mm, &context.patches};
+    const PredictedBody predicted{&body.response, &body.places, body.unknowns(fit.posterior), context.about_mm,
+                                  &context.patches};
     fit = fit_rows(prior, data, predicted, &model, context);
   }
   return fit;

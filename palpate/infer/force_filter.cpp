@@ -101,6 +101,7 @@ struct ForceFilter::State {
     for (const TissuePoint& point : points) sum += point.rest_mm;
     about_mm = points.empty() ? rest_mm.front() : Vec3(sum / static_cast<double>(points.size()));
     even_points = spread_evenly(points, kEvenPoints);
+    if (options.drive == Drive::tip) parameters.log_radius_walk = 0;  // the radius is the one stated
     belief = initial_belief(parameters);
     for (size_t i = 0; i < kMostInstruments; ++i) hands.emplace_back(options.grip);
   }
@@ -110,7 +111,8 @@ struct ForceFilter::State {
     const bool settles = std::any_of(hands.begin(), hands.end(), [this](const Hand& hand) {
       return hand.contact && last_time_s - hand.onset_s < kSettling_s;
     });
-    return {rectification, parameters, about_mm, options.drive == Drive::fused || settles, stated_log_radius(), patches};
+    return {rectification,       parameters, about_mm, options.drive == Drive::fused || settles,
+            stated_log_radius(), patches};
   }
 
   double stated_log_radius() const { return std::log(options.footprint_radius_mm); }
@@ -364,8 +366,7 @@ struct ForceFilter::State {
     hand.filter.update(log_likelihood);
     if (hand.filter.probability(Hold::free) > 0.5 || tip.closed == false) {
       // Near its place the tip may still turn out to hold the tissue.
-      if (hand.is_told ||
-          (tip.visible && tip.closed.value_or(true) && is_near_its_patch(tip, free.posterior, k))) {
+      if (hand.is_told || (tip.visible && tip.closed.value_or(true) && is_near_its_patch(tip, free.posterior, k))) {
         hand.free_scene = free.posterior.scene(about_mm);
         keep_slow(prior, k, belief);
         return;

@@ -8,7 +8,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("point_dof", p.point_dof, positive, "Student-t degrees of freedom of a point");
   settings.number("effective_points", p.effective_points, positive, "effective sample size of a frame's points");
   settings.number("motion_error", p.motion_error, {0, 10}, "error of the model's motion of a point, ratio to it");
-  settings.number("far_motion_error", p.far_motion_error, {0, 10}, "the same as far from the patch as its attachments are; grows with the square of the distance");
+  settings.number("far_motion_error", p.far_motion_error, {0, 10},
+                  "the same as far from the patch as its attachments are; grows with the square of the distance");
   settings.number("rim_motion_error", p.rim_motion_error, {0, 10},
                   "the same two radii from the middle of the patch; grows with the fourth power of nearness");
   settings.number("tip_floor_mm", p.tip_floor_mm, positive, "min. deviation of the tip's displacement");
@@ -27,7 +28,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("offset_mm", p.offset_mm, positive, "prior of measured tip minus middle of the patch, each axis");
   settings.number("touch_mm", p.touch_mm, positive, "displacement of the patch in the frame of onset");
   settings.number("stated_radius", p.stated_radius, positive, "the same where the stated radius is right (Cauchy)");
-  settings.number("skew", p.skew, positive, "prior of the common error of the model's motion of all tissue, ratio to it");
+  settings.number("skew", p.skew, positive,
+                  "prior of the common error of the model's motion of all tissue, ratio to it");
   settings.number("tissue_radius", p.tissue_radius, positive, "error of the log radius that the tissue tells");
   settings.number("offset_walk_mm", p.offset_walk_mm, {0, 100}, "random walk of the offset, mm per sqrt(s)");
   settings.number("log_radius_walk", p.log_radius_walk, {0, 100}, "random walk of the log radius per sqrt(s)");

@@ -25,7 +25,7 @@ struct InferenceParameters {
   double hand_mm_per_s = 40;                        ///< speed of a hand: walk of the patch, and of a free tip
   double log_radius = 0.7;                          ///< of the patch's radius: a factor of two
   double stated_radius = 0.1;                       ///< the same where the stated one is right (Cauchy)
-  double tissue_radius = 0.05; ///< of the log radius that the tissue tells: the model's error far from the patch
+  double tissue_radius = 0.05;  ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset

@@ -23,9 +23,9 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
   return sum;
 }
 
-/// Ratio of the error of the model's motion of a point to that motion. Near a patch the tissue answers as a half-space would; as far
-/// from it as its attachments are, all that is not known of the body counts (Saint-Venant); at its rim, what is not known
-/// of the patch.
+/// Ratio of the error of the model's motion of a point to that motion. Near a patch the tissue answers as a half-space
+/// would; as far from it as its attachments are, all that is not known of the body counts (Saint-Venant); at its rim,
+/// what is not known of the patch.
 double motion_error(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
   double far = std::numeric_limits<double>::infinity(), rim = 0;
   if (!body.patches || body.patches->empty()) return parameters.motion_error;

@@ -146,7 +146,8 @@ std::vector<cv::Point2f> spread_corners(const cv::Mat& grey, const cv::Mat& wher
   std::vector<int> taken(static_cast<size_t>(columns * (grey.rows / cell_px + 1)), 0);
   std::vector<cv::Point2f> chosen;
   for (const cv::Point2f& p : candidates) {  // the best ones first
-    int& in_cell = taken[static_cast<size_t>(static_cast<int>(p.y) / cell_px * columns + static_cast<int>(p.x) / cell_px)];
+    int& in_cell =
+        taken[static_cast<size_t>(static_cast<int>(p.y) / cell_px * columns + static_cast<int>(p.x) / cell_px)];
     if (in_cell >= kInCell) continue;
     ++in_cell;
     chosen.push_back(p);
@@ -181,7 +182,8 @@ Tracks follow(const CameraReference& reference, const std::vector<cv::Point2f>& 
   const cv::Mat covered = grown(instrument, kInstrumentMargin_px);
   tracks.correlation.assign(tracks.points.size(), 0);
   tbb::parallel_for(size_t{0}, tracks.points.size(), [&](size_t i) {
-    if (!tracks.found[i] || set_or_outside(covered, grey.size(), tracks.points[i]) || shines(bgr, tracks.points[i], white)) {
+    if (!tracks.found[i] || set_or_outside(covered, grey.size(), tracks.points[i]) ||
+        shines(bgr, tracks.points[i], white)) {
       tracks.found[i] = 0;
       return;
     }
@@ -259,7 +261,9 @@ std::vector<TissuePoint> TissueTracker::update(const RectifiedPair& pair, const 
   const double min_correlation = s.parameters.min_correlation;
   tbb::parallel_invoke(
       [&] { left = follow(s.left, left_from, pair.left, left_instrument, left_guess, min_correlation, s.white); },
-      [&] { right = follow(s.right, right_from, pair.right, right_instrument, right_guess, min_correlation, s.white); });
+      [&] {
+        right = follow(s.right, right_from, pair.right, right_instrument, right_guess, min_correlation, s.white);
+      });
   for (size_t i = 0; i < wanted.size(); ++i) {
     if (!left.found[i] || !right.found[i]) continue;
     const cv::Point2f left_motion = left.points[i] - left_from[i], right_motion = right.points[i] - right_from[i];

@@ -57,8 +57,9 @@ TEST(Modulus, AKnownForceIsWrittenAsForceAtTime) {
 }
 
 TEST(Modulus, IsWrittenIntoTheSceneAndAllElseIsKept) {
-  EXPECT_EQ(app::with_modulus("# mine\ntissue:\n  law: linear\n  young_modulus_kPa: unknown  # to be found\n", 12.345, 0.4),
-            "# mine\ntissue:\n  law: linear\n  young_modulus_kPa: 12.35  # to be found\n");
+  EXPECT_EQ(
+      app::with_modulus("# mine\ntissue:\n  law: linear\n  young_modulus_kPa: unknown  # to be found\n", 12.345, 0.4),
+      "# mine\ntissue:\n  law: linear\n  young_modulus_kPa: 12.35  # to be found\n");
   EXPECT_EQ(app::with_modulus("tissue: {young_modulus_kPa: 27, poisson_ratio: 0.45}\nmap: {}\n", 5, 0.45),
             "tissue: {young_modulus_kPa: 5, poisson_ratio: 0.45}\nmap: {}\n");
   EXPECT_EQ(app::with_modulus("tissue: {preset: liver}  # textbook\n", 5, 0.45),
@@ -104,7 +105,8 @@ TEST(Modulus, OfTheRenderedUterusIsFoundFromItsTrueForceAndGivesThatForceBack) {
   EXPECT_TRUE(std::filesystem::exists(workspace / "scene.modulus.yaml"));
   EXPECT_THAT(read_file(scene), testing::Not(HasSubstr("unknown")));
 
-  const Outcome known = run_palpate("estimate " + scene + " -o " + (workspace / "known").string() + " --json --truth " + truth);
+  const Outcome known =
+      run_palpate("estimate " + scene + " -o " + (workspace / "known").string() + " --json --truth " + truth);
   ASSERT_EQ(known.exit_code, 0) << known.error;
   EXPECT_NEAR(nlohmann::json::parse(known.output)["comparison"]["gain"].get<double>(), 1, 0.03);
 }
@@ -114,8 +116,10 @@ TEST(Program, TellsTheForceFromTheVisibleSurfaceAloneWhereTheOperatorSaysThePlac
   const Workspace workspace;
   const std::string scene = (workspace / "scene.yaml").string();
   const std::string truth = (reference_data() / "rendered_uterus/truth.csv").string();
-  write_rendered_scene(scene, {{"contact: {", "contact: {at_px: [396, 176], "}, {"segmentation: colour", "segmentation: none"}});
-  const Outcome outcome = run_palpate("estimate " + scene + " -o " + (workspace / "out").string() + " --json --truth " + truth);
+  write_rendered_scene(
+      scene, {{"contact: {", "contact: {at_px: [396, 176], "}, {"segmentation: colour", "segmentation: none"}});
+  const Outcome outcome =
+      run_palpate("estimate " + scene + " -o " + (workspace / "out").string() + " --json --truth " + truth);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
   const auto figures = nlohmann::json::parse(outcome.output)["comparison"];
   EXPECT_LT(figures["force_nrmse_pct"].get<double>(), 10);
@@ -124,11 +128,12 @@ TEST(Program, TellsTheForceFromTheVisibleSurfaceAloneWhereTheOperatorSaysThePlac
     if (row.status == "ok") EXPECT_THAT(row.warnings, HasSubstr("tip_inferred"));
 }
 
-TEST(BadInput, APlaceOfContactBesideInstrumentsThatAreLookedForIsRefused) {
+TEST(Program, APlaceOfContactBesideInstrumentsThatAreLookedForIsRefused) {
   const Workspace workspace;
   write_plane_recording(workspace / "in", 2);
-  replace_in_file(workspace / "in/scene.yaml", "contact:\n", "contact:\n  at_px: [100, 100]\n");
-  const Outcome refused = run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string());
+  replace_in_file(workspace / "in/scene.yaml", "contact: {", "contact: {at_px: [100, 100], ");
+  const Outcome refused =
+      run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string());
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.error, HasSubstr("instrument.segmentation: none"));
 }
