@@ -124,8 +124,11 @@ TEST(Program, TellsTheForceFromTheVisibleSurfaceAloneWhereTheOperatorSaysThePlac
   const auto figures = nlohmann::json::parse(outcome.output)["comparison"];
   EXPECT_LT(figures["force_nrmse_pct"].get<double>(), 10);
   EXPECT_EQ(figures["false_contact_frames"].get<int>(), 0);
-  for (const ForceRow& row : read_forces(workspace / "out/forces.csv"))
-    if (row.status == "ok") EXPECT_THAT(row.warnings, HasSubstr("tip_inferred"));
+  for (const ForceRow& row : read_forces(workspace / "out/forces.csv")) {
+    if (row.status == "ok") {
+      EXPECT_THAT(row.warnings, HasSubstr("tip_inferred"));
+    }
+  }
 }
 
 TEST(Program, APlaceOfContactBesideInstrumentsThatAreLookedForIsRefused) {
