@@ -20,7 +20,7 @@ StripChart::StripChart(double duration_s, std::string unit)
 void StripChart::add(double time_s, std::optional<double> force_N) {
   samples_.push_back({time_s, force_N});
   while (samples_.front().time_s < time_s - duration_s_) samples_.pop_front();
-  if (force_N) most_N_ = std::max(most_N_, round_up(1.05 * *force_N));
+  if (force_N && *force_N > 0) most_N_ = std::max(most_N_, round_up(1.05 * *force_N));
 }
 
 void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& colour, double scale) const {

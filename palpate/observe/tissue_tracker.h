@@ -14,7 +14,7 @@ struct TissuePoint {
   Vec3 rest_mm = Vec3::Zero();    ///< where it lies in the map frame, left camera frame
   Vec3 motion_px = Vec3::Zero();  ///< left x, left y and disparity of the rectified pair, now minus in the map frame
   double noise = 1;               ///< of the motion, over that of a point that looks as in the map frame
-  double model_mm = 0;            ///< least error with which a model is believed to move it
+  double model_mm = 0;            ///< min. error with which a model is believed to move it
 };
 
 struct TissueTrackerParameters {

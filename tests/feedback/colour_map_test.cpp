@@ -68,6 +68,16 @@ TEST(StripChart, LeavesAGapWhereThereIsNoAnswer) {
   EXPECT_EQ(curve_pixels(empty), 0);
 }
 
+TEST(StripChart, ShowsASmallForceThatBeginsAtNothingAtItsOwnScale) {
+  StripChart chart(10), per_modulus(10, "N/kPa");
+  for (StripChart* each : {&chart, &per_modulus}) {
+    each->add(0, 0.0);
+    each->add(0.1, 0.02);
+  }
+  EXPECT_DOUBLE_EQ(chart.most_N(), 0.1);
+  EXPECT_DOUBLE_EQ(per_modulus.most_N(), 0.05);
+}
+
 TEST(StripChart, ForgetsWhatIsOlderThanItShows) {
   StripChart chart(2);
   for (int i = 0; i < 100; ++i) chart.add(0.04 * i, 1.0);
