@@ -50,6 +50,8 @@ struct FrameAnswer {
   std::optional<Equilibrium> equilibrium;
 };
 
+struct FilterState;
+
 /// The causal maximum a posteriori estimate around Eq. 3 (docs/inference.md): keeps what is believed of scene and
 /// contacts from frame to frame.
 class ForceFilter {
@@ -71,8 +73,7 @@ class ForceFilter {
   const ContactModel& model() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<FilterState> state_;
 };
 
 }  // namespace palpate

@@ -13,11 +13,6 @@ namespace {
 
 /// No hypothesis is ever ruled out for good.
 constexpr double kMinProbability = 1e-6;
-/// A tip at the place that it held, and that looks free, holds it again at this rate: tissue that rests as yet says
-/// little against it.
-constexpr double kHoldAgain_per_s = 10;
-/// Coulomb's coefficient is known to a factor, not to a figure.
-constexpr double kFrictionDeviationRatio = 0.5;
 
 double& at(ByHold& values, Hold hold) {
   return values[static_cast<size_t>(hold)];
@@ -25,11 +20,6 @@ double& at(ByHold& values, Hold hold) {
 
 double log_normal(double x, double deviation) {
   return -0.5 * x * x / (deviation * deviation) - std::log(deviation * std::sqrt(2 * std::numbers::pi));
-}
-
-double log_normal(const Vec3& x, const Mat3& covariance) {
-  return -0.5 *
-         (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
 }
 
 double log_sum(double a, double b) {
@@ -42,6 +32,11 @@ double log_sum(double a, double b) {
 std::string hold_name(Hold hold) {
   constexpr const char* kNames[] = {"free", "grasp", "push", "slide"};
   return kNames[static_cast<size_t>(hold)];
+}
+
+double log_normal(const Vec3& x, const Mat3& covariance) {
+  return -0.5 *
+         (x.dot(covariance.llt().solve(x)) + std::log(covariance.determinant()) + 3 * std::log(2 * std::numbers::pi));
 }
 
 double log_normal_cdf(double x) {
@@ -66,7 +61,7 @@ void HoldFilter::predict(double seconds, const InferenceParameters& parameters) 
     at(next, Hold::free) += released * at(probability_, hold);
     at(next, hold) -= released * at(probability_, hold);
   }
-  const double touched = changed(kHoldAgain_per_s) * probability(Hold::free);
+  const double touched = changed(parameters.hold_again_per_s) * probability(Hold::free);
   at(next, Hold::free) -= touched;
   if (grip_ != Grip::push) at(next, Hold::grasp) += grip_ == Grip::grasp ? touched : 0.5 * touched;
   if (grip_ != Grip::grasp) at(next, Hold::push) += grip_ == Grip::push ? touched : 0.5 * touched;
@@ -131,8 +126,8 @@ TouchEvidence touch_evidence(const FreeTip& tip, double seconds, const Inference
   return {log_sum(noticed, unnoticed) - if_free, unnoticed > noticed};
 }
 
-double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, const Vec3& outward_normal,
-                            double friction) {
+double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, const Vec3& outward_normal, double friction,
+                            double friction_error) {
   const double pressed_N = -force_N.dot(outward_normal);
   const Vec3 tangential_N = force_N + pressed_N * outward_normal;
   const double deviation_N = std::sqrt(std::max(outward_normal.dot(covariance_N2 * outward_normal), 1e-18));
@@ -140,7 +135,7 @@ double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, cons
   const Vec3 direction = along_N > 0 ? Vec3(tangential_N / along_N) : outward_normal.unitOrthogonal();
   const double cone_deviation_N =
       std::sqrt(std::max(direction.dot(covariance_N2 * direction), 1e-18) + std::pow(friction * deviation_N, 2) +
-                std::pow(kFrictionDeviationRatio * friction * std::max(pressed_N, 0.0), 2));
+                std::pow(friction_error * friction * std::max(pressed_N, 0.0), 2));
   const double log_probability = log_normal_cdf(pressed_N / deviation_N) +
                                  log_normal_cdf((friction * std::max(pressed_N, 0.0) - along_N) / cone_deviation_N);
   return std::min(0.0, log_probability - 2 * std::log(0.5));

@@ -61,10 +61,12 @@ struct TouchEvidence {
 TouchEvidence touch_evidence(const FreeTip& tip, double seconds, const InferenceParameters& parameters);
 
 /// log probability that a force (N, with covariance) lies in Coulomb's cone about the inward normal, against that of no
-/// force at all; never above 0.
-double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, const Vec3& outward_normal,
-                            double friction);
+/// force at all; never above 0. `friction_error`: deviation of the coefficient, ratio to it.
+double log_in_friction_cone(const Vec3& force_N, const Mat3& covariance_N2, const Vec3& outward_normal, double friction,
+                            double friction_error);
 
+/// Normal density around 0, its logarithm.
+double log_normal(const Vec3& x, const Mat3& covariance);
 /// Standard normal distribution function, its logarithm.
 double log_normal_cdf(double x);
 

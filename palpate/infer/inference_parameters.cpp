@@ -43,6 +43,20 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("resting_mm_per_s", p.resting_mm_per_s, positive, "speed of a tip that has touched");
   settings.number("unnoticed", p.unnoticed, probability, "probability that a touch begins unnoticed");
   settings.number("inside_mm", p.inside_mm, positive, "how deep such a tip may be");
+  settings.number("unconfirmed", p.unconfirmed, probability,
+                  "max. probability of such a touch until the next frame's tissue confirms it");
+  settings.number("told_log_odds", p.told_log_odds, positive, "log odds of what the jaws are seen to do");
+  settings.number("held_untold", p.held_untold, probability, "probability that contact.at_px is held already");
+  settings.number("hold_again_per_s", p.hold_again_per_s, positive, "rate at which a tip holds its last place again");
+  settings.number("left_mm", p.left_mm, positive, "as far from its place, or from the surface, a tip has left it");
+  settings.number("friction_error", p.friction_error, positive, "deviation of the friction coefficient, ratio to it");
+  settings.number("even_points", p.even_points, {1, 10000}, "points followed all over the organ");
+  settings.number("near_points", p.near_points, {0, 10000}, "points followed around each contact");
+  settings.number("settling_s", p.settling_s, {0, 10}, "time after onset in which tissue tells where the tip stands");
+  settings.number("unexplained_deviations", p.unexplained_deviations, positive,
+                  "a point farther from its prediction is not explained");
+  settings.number("unexplained_ratio", p.unexplained_ratio, probability,
+                  "more of the points than this unexplained: map_stale");
   settings.number("model_error", p.model_error, {0, 10}, "of the force, ratio to it: what the model's form leaves");
 }
 

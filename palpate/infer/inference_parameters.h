@@ -42,6 +42,18 @@ struct InferenceParameters {
   double resting_mm_per_s = 2.5;  ///< speed of a tip that has touched, against the tissue
   double unnoticed = 0.05;        ///< probability that a touch begins unnoticed, anywhere inside
   double inside_mm = 10;          ///< how deep such a tip may be
+  double unconfirmed = 0.4;       ///< max. probability of such a touch, until the next frame's tissue confirms it
+  double told_log_odds = 10;      ///< of what the jaws are seen to do: closing they touch, closed they are not free
+  double held_untold = 0.02;      ///< probability that the place that the operator names is held already
+  double hold_again_per_s = 10;   ///< a tip that looks free holds its place again
+  double left_mm = 2;             ///< as far from its place, or from the surface, a tip has left it
+  double friction_error = 0.5;    ///< deviation of the friction coefficient, ratio to it
+
+  // Which tissue is followed, and when it is not explained.
+  double even_points = 110, near_points = 90;  ///< points followed all over the organ, and around each contact
+  double settling_s = 0.15;                    ///< after onset the tip's place against the patch is told by the tissue
+  double unexplained_deviations = 6;           ///< a point farther from its prediction is not explained
+  double unexplained_ratio = 0.6;              ///< more of them than this: no hypothesis explains the frame
 
   // The band.
   double model_error = 0.03;  ///< of the force, ratio to it: what the model's form leaves

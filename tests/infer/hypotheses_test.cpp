@@ -43,10 +43,10 @@ TEST(Hypotheses, ATipFoundInsideHasTouchedUnnoticed) {
 TEST(Hypotheses, APullLiesInNoFrictionConeAndAPressDoes) {
   const Vec3 normal(0, 0, -1);
   const Mat3 covariance = 0.01 * Mat3::Identity();
-  EXPECT_EQ(log_in_friction_cone({0, 0, 2}, covariance, normal, 0.3), 0);
-  EXPECT_LT(log_in_friction_cone({0, 0, -2}, covariance, normal, 0.3), -50);
-  EXPECT_LT(log_in_friction_cone({2, 0, 1}, covariance, normal, 0.3), -10);
-  EXPECT_NEAR(log_in_friction_cone(Vec3::Zero(), covariance, normal, 0.3), 0, 1e-9);
+  EXPECT_EQ(log_in_friction_cone({0, 0, 2}, covariance, normal, 0.3, 0.5), 0);
+  EXPECT_LT(log_in_friction_cone({0, 0, -2}, covariance, normal, 0.3, 0.5), -50);
+  EXPECT_LT(log_in_friction_cone({2, 0, 1}, covariance, normal, 0.3, 0.5), -10);
+  EXPECT_NEAR(log_in_friction_cone(Vec3::Zero(), covariance, normal, 0.3, 0.5), 0, 1e-9);
 }
 
 TEST(Hypotheses, WhatTheSceneRulesOutIsNeverProbable) {

@@ -1,0 +1,53 @@
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/infer/filter_state.h"
+
+namespace palpate {
+
+void FilterState::report(size_t instrument, const ContactFit& fit, const TipObservation& tip,
+                         InstrumentAnswer& answer) const {
+  const Hand& hand = hands[instrument];
+  const size_t k = *hand.contact;
+  const SceneMotion scene = fit.posterior.scene(about_mm);
+  const Mat3 R = scene.rotation();
+  const ForceAt force = force_at(*body, fit.posterior, k);
+  answer.hold = hand.filter.most_probable();
+  answer.p_contact = hand.filter.p_contact();
+  answer.converged = fit.converged;
+  answer.force_N = R * force.force_N;
+  answer.force_covariance_N2 = R * force_covariance(force, fit) * R.transpose();
+  const ContactForce& solved = body->response.equilibrium.contacts[k];
+  const double solved_N = solved.force_N.norm();
+  answer.mean_nodal_force_N =
+      solved_N > 0 ? solved.mean_nodal_force_N * force.force_N.norm() / solved_N : solved.mean_nodal_force_N;
+  answer.place_mm = model.footprint(k).center_mm;
+  answer.q_mm = fit.posterior.q_mm(k);
+  answer.footprint_mm = std::exp(fit.posterior.log_radius(k));
+  answer.tip_inferred = !tip.visible;
+  answer.tip_mm = scene.apply(model.footprint(k).center_mm + fit.posterior.q_mm(k));
+  answer.near_attachment = model.distance_to_attachments_mm(k) < 2 * options.footprint_radius_mm;
+}
+
+double FilterState::misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {
+  PredictedBody predicted{nullptr, nullptr, at.mean, about_mm};
+  if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm, &patches};
+  const std::vector<Measurement> rows = tissue_measurements(data.tissue, predicted, rectification, parameters);
+  std::vector<double> misfits;
+  const double max_distance2 = std::pow(parameters.unexplained_deviations, 2);
+  size_t unexplained = 0;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const Eigen::VectorXd residual = rows[i].residual - rows[i].H * (at.mean - predicted.x0);
+    misfits.push_back(residual.head<2>().norm() * data.tissue[i].rest_mm.z() / rectification.focal_px);
+    unexplained += residual.dot(rows[i].covariance.ldlt().solve(residual)) > max_distance2;
+  }
+  explained = rows.size() < 10 ||
+              static_cast<double>(unexplained) < parameters.unexplained_ratio * static_cast<double>(rows.size());
+  if (misfits.empty()) return 0;
+  const auto middle = misfits.begin() + static_cast<std::ptrdiff_t>(misfits.size() / 2);
+  std::nth_element(misfits.begin(), middle, misfits.end());
+  return *middle;
+}
+
+}  // namespace palpate

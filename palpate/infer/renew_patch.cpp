@@ -1,0 +1,54 @@
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/infer/filter_state.h"
+
+namespace palpate {
+
+namespace {
+
+/// A patch whose radius has changed by this ratio is laid anew.
+constexpr double kRadiusChange = 0.08;
+/// A slid patch is laid anew when it stands so many radii from its place.
+constexpr double kSlideReach_radii = 0.4;
+
+}  // namespace
+
+void FilterState::renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit) {
+  Hand& hand = hands[instrument];
+  const size_t k = *hand.contact;
+  const ForceAt force = force_at(*body, fit.posterior, k);
+  const double deviation_N = std::sqrt(force_covariance(force, fit).trace() / 3);
+  // Learned without the operator's word, which each fit hears anew; the patch is laid as it is believed with it.
+  double& learned = belief.mean[Unknowns::log_radius(k)];
+  double log_radius = fit.posterior.log_radius(k);
+  if (force.force_N.norm() < parameters.telling_force * deviation_N) {
+    forget(prior, Unknowns::log_radius(k), 1, belief);
+    return;
+  }
+  learned = std::clamp(learned, stated_log_radius() + std::log(parameters.min_radius_ratio),
+                       stated_log_radius() + std::log(parameters.max_radius_ratio));
+  log_radius = std::clamp(log_radius, stated_log_radius() + std::log(parameters.min_radius_ratio),
+                          stated_log_radius() + std::log(parameters.max_radius_ratio));
+  if (hand.filter.most_probable() == Hold::slide) {
+    const Vec3 normal = model.footprint(k).normal;
+    Vec3 slid_mm = belief.offset_mm(k) - hand.slid_from_mm;
+    slid_mm -= slid_mm.dot(normal) * normal;
+    if (slid_mm.norm() > kSlideReach_radii * std::exp(log_radius)) {
+      const Vec3 from_mm = model.footprint(k).center_mm;
+      model.move(k, from_mm + slid_mm);
+      belief.mean.segment<3>(Unknowns::offset(k)) -= model.footprint(k).center_mm - from_mm;
+      hand.slid_from_mm = belief.offset_mm(k);
+      solve_anew();
+      return;
+    }
+  }
+  if (std::abs(log_radius - std::log(model.radius_mm(k))) > kRadiusChange) {
+    const std::optional<Equilibrium> equilibrium = model.set_radius(k, std::exp(log_radius), body->q_mm);
+    if (!equilibrium) return;
+    body->response = model.respond(*equilibrium, body->q_mm);
+    body->log_radius[k] = std::log(model.radius_mm(k));
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,121 @@
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/infer/filter_state.h"
+
+namespace palpate {
+
+Gap FilterState::gap_of(const Vec3& tip_in_map_mm) const {
+  if (!body) return gap_to_surface(tip_in_map_mm, rest_mm, rest_boundary);
+  std::vector<Vec3> nodes = model.model().rest_mm();
+  for (size_t n = 0; n < nodes.size(); ++n)
+    nodes[n] += body->response.equilibrium.u.segment<3>(3 * static_cast<Eigen::Index>(n));
+  return gap_to_surface(tip_in_map_mm, nodes, model.boundary());
+}
+
+Vec3 FilterState::place_at_rest(const Gap& gap) const {
+  const std::vector<Triangle>& triangles = body ? model.boundary() : rest_boundary;
+  const std::vector<Vec3>& nodes = body ? model.model().rest_mm() : rest_mm;
+  Vec3 place_mm = Vec3::Zero();
+  for (size_t c = 0; c < 3; ++c)
+    place_mm += gap.barycentric[static_cast<int>(c)] *
+                nodes[static_cast<size_t>(triangles[static_cast<size_t>(gap.triangle)][c])];
+  return place_mm;
+}
+
+ContactPrior FilterState::prior_of_touch() const {
+  ContactPrior prior;
+  prior.q_covariance_mm2 = parameters.touch_mm * parameters.touch_mm * Mat3::Identity();
+  prior.offset_covariance_mm2 = parameters.offset_mm * parameters.offset_mm * Mat3::Identity();
+  prior.log_radius = stated_log_radius();
+  prior.skew_deviation = parameters.skew;
+  prior.log_radius_deviation = options.drive == Drive::fused ? parameters.log_radius : 1e-3;
+  return prior;
+}
+
+void FilterState::begin_at(size_t instrument, const Vec3& place_mm, const ContactPrior& prior) {
+  Hand& hand = hands[instrument];
+  model.begin(place_mm, options.footprint_radius_mm);
+  hand.contact = model.contact_count() - 1;
+  instrument_of_contact.push_back(instrument);
+  hand.released_at_mm.reset();
+  hand.slid_from_mm.setZero();
+  hand.onset_s = last_time_s;
+  belief = with_contact(belief, prior);
+  solve_anew();
+}
+
+void FilterState::begin_told(size_t instrument, const FrameEvidence& frame) {
+  begin_at(instrument, *frame.held_at_mm, prior_of_touch());
+  hands[instrument].is_told = true;
+  hands[instrument].filter.touch(frame.held_for_sure ? 1 : parameters.held_untold);
+  hands[instrument].free_scene = belief.scene(about_mm);
+}
+
+void FilterState::begin(size_t instrument, const TipObservation& tip, const Gap& gap, bool unnoticed) {
+  Hand& hand = hands[instrument];
+  hand.tip_at_mark_mm = tip.tip_mm;
+  ContactPrior prior = prior_of_touch();
+  if (unnoticed) {
+    prior.q_mm = std::min(0.0, gap.distance_mm) * gap.normal;
+    const double deviation_mm = parameters.touch_mm + 0.5 * std::abs(gap.distance_mm);
+    prior.q_covariance_mm2 = deviation_mm * deviation_mm * Mat3::Identity();
+  }
+  begin_at(instrument, place_at_rest(gap), prior);
+  // Where the tip stands against the patch: the displacement of the first frame is known to touch_mm.
+  FrameData data;
+  data.seconds = 0.04;
+  data.tips.push_back({*hand.contact, tip.tip_mm, Mat3::Zero()});  // from now on the tip counts from here
+  const ContactFit fit = fit_linear(belief, data, *body, model, context());
+  belief = fit.kept;
+  hand.slid_from_mm = belief.offset_mm(*hand.contact);
+}
+
+void FilterState::look_for_touch(size_t instrument, const TipObservation& tip, double seconds,
+                                 InstrumentAnswer& answer) {
+  Hand& hand = hands[instrument];
+  const Vec3 tip_mm = belief.scene(about_mm).undo(tip.tip_mm);
+  const Gap gap = gap_of(tip_mm);
+  if (hand.released_at_mm &&
+      ((tip_mm - *hand.released_at_mm).norm() > parameters.left_mm || gap.distance_mm > parameters.left_mm))
+    hand.released_at_mm.reset();
+  if (!hand.last_tip_mm) return;
+  FreeTip free;
+  free.gap_mm = gap.distance_mm;
+  free.gap_deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
+  free.step_mm = tip_mm - *hand.last_tip_mm;
+  free.step_covariance_mm2 = tip_floor_covariance_mm2(tip_mm, rectification, parameters);
+  const bool closes = tip.closed.value_or(false) && hand.was_closed == false;
+  const double reach_mm = options.threshold_mm + std::min(2 * free.gap_deviation_mm, 0.5 * options.threshold_mm);
+  if (free.gap_mm > reach_mm || tip.closed == false) return;
+  TouchEvidence evidence = touch_evidence(free, seconds, parameters);
+  if (hand.released_at_mm && !evidence.unnoticed) return;
+  const double rate = 1 - std::exp(-parameters.touch_per_s * seconds);
+  double log_odds = std::log(rate / (1 - rate)) + evidence.log_ratio;
+  if (closes) log_odds = parameters.told_log_odds;
+  const double probability = 1 / (1 + std::exp(-log_odds));
+  if (probability < 0.5) return;
+  begin(instrument, tip, gap, evidence.unnoticed && !closes);
+  hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, parameters.unconfirmed) : probability);
+  answer.begins = true;
+}
+
+void FilterState::release(size_t instrument, const Belief& without) {
+  Hand& hand = hands[instrument];
+  const size_t contact = *hand.contact;
+  hand.released_at_mm = hand.last_tip_mm;
+  hand.contact.reset();
+  hand.filter.release();
+  model.end(contact);
+  instrument_of_contact.erase(instrument_of_contact.begin() + static_cast<std::ptrdiff_t>(contact));
+  for (Hand& other : hands)
+    if (other.contact && *other.contact > contact) --*other.contact;
+  belief = without;
+  if (model.contact_count() == 0) {
+    body.reset();
+  } else {
+    solve_anew();
+  }
+}
+
+}  // namespace palpate
