@@ -1,5 +1,6 @@
 #include "palpate/contact/contact_model.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,6 +20,18 @@ struct Patch {
   double radius_mm = 0;
   Footprint footprint;
 };
+
+/// A patch that is a quarter larger bears about a quarter more. On a stiffness that is nearly singular (tissue pressed
+/// beneath another patch) it may seem to bear anything.
+constexpr double kPlausibleRatio = 2;
+
+bool is_plausible(const ContactSensitivity& changed, const ContactSensitivity& now, size_t contact) {
+  const auto at = 3 * static_cast<Eigen::Index>(contact);
+  const Mat3 force = changed.force.block<3, 3>(at, at);
+  const double ratio = force.trace() / now.force.block<3, 3>(at, at).trace();
+  return Eigen::LLT<Mat3>(0.5 * (force + force.transpose())).info() == Eigen::Success && ratio > 1 / kPlausibleRatio &&
+         ratio < kPlausibleRatio;
+}
 
 /// Unit response of all contacts with one patch made larger, minus with it made smaller, per log radius.
 struct RadiusDerivative {
@@ -80,9 +93,17 @@ struct ContactModel::State {
     sensitivity = solver->sensitivity();
     radius_derivatives.clear();
     for (size_t i = 0; i < patches.size(); ++i) {
-      const double radius_mm = patches[i].radius_mm, per_log = 1 / (2 * std::log(kRadiusStep));
-      const ContactSensitivity larger = solver->sensitivity_with(footprints_with(i, radius_mm * kRadiusStep)),
-                               smaller = solver->sensitivity_with(footprints_with(i, radius_mm / kRadiusStep));
+      const auto of_radius = [&](double ratio) {
+        return solver->sensitivity_with(footprints_with(i, patches[i].radius_mm * ratio));
+      };
+      ContactSensitivity larger = of_radius(kRadiusStep), smaller = of_radius(1 / kRadiusStep);
+      double steps = 2;
+      for (ContactSensitivity* changed : {&larger, &smaller})
+        if (!is_plausible(*changed, sensitivity, i)) {
+          *changed = sensitivity;
+          --steps;
+        }
+      const double per_log = 1 / (std::max(steps, 1.0) * std::log(kRadiusStep));
       radius_derivatives.push_back(
           {per_log * (larger.motion - smaller.motion), per_log * (larger.force - smaller.force)});
     }

@@ -75,6 +75,11 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
       if (s.hands[instrument].filter.most_probable() == Hold::slide) s.belief = fit.kept;
     }
   }
+  // A touch that nobody saw and that has no equilibrium was a wrong tip's.
+  for (size_t instrument : std::vector<size_t>(s.instrument_of_contact)) {
+    if (fit.converged || s.hands[instrument].is_confirmed) continue;
+    s.release(instrument, without_contact(s.belief, *s.hands[instrument].contact));
+  }
   bool explained = true;
   const double misfit_mm = s.misfit_mm(data, s.belief, explained);
   answer.explained = explained;

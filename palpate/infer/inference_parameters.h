@@ -30,7 +30,7 @@ struct InferenceParameters {
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
   double skew = 0.05;                                   ///< common error of the model's motion of all tissue, ratio
-  double offset_walk_mm = 0.05, log_radius_walk = 0.5;  ///< the same, per square root of a second
+  double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.

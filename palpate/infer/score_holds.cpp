@@ -27,10 +27,18 @@ double FilterState::force_per_mm(size_t contact) const {
 
 ContactFit FilterState::fit_sliding(const Belief& prior, const FrameData& data, size_t contact) const {
   const Vec3 normal = model.footprint(contact).normal;
+  const Mat3 along_surface = Mat3::Identity() - normal * normal.transpose();
   Belief sliding = prior;
-  const double step_mm = parameters.hand_mm_per_s * data.seconds;
-  sliding.covariance.block<3, 3>(Unknowns::offset(contact), Unknowns::offset(contact)) +=
-      step_mm * step_mm * (Mat3::Identity() - normal * normal.transpose());
+  const auto walks = [&](Eigen::Index at, double mm_per_s) {
+    const double step_mm = mm_per_s * data.seconds;
+    sliding.covariance.block<3, 3>(at, at) += std::copysign(step_mm * step_mm, mm_per_s) * along_surface;
+  };
+  // It is the tip that walks at the speed of a hand; the tissue stays, as friction drags it, and so does the radius.
+  walks(Unknowns::offset(contact), parameters.hand_mm_per_s);
+  walks(Unknowns::q(contact), -parameters.hand_mm_per_s);
+  walks(Unknowns::q(contact), parameters.resting_mm_per_s);
+  const Eigen::Index radius = Unknowns::log_radius(contact);
+  sliding.covariance(radius, radius) -= std::pow(parameters.log_radius_walk, 2) * data.seconds;
   const ForceAt at = force_at(*body, prior, contact);
   const double pressed_N = -at.force_N.dot(normal);
   const Vec3 tangential_N = at.force_N + pressed_N * normal;
@@ -122,6 +130,7 @@ void FilterState::score_holds(size_t instrument, const Belief& prior, const Fram
     release(instrument, free.kept);
     return;
   }
+  hand.is_confirmed = true;
   if (sliding && hand.filter.most_probable() == Hold::slide) tied = *sliding;
 }
 

@@ -96,6 +96,7 @@ void FilterState::look_for_touch(size_t instrument, const TipObservation& tip, d
   const double probability = 1 / (1 + std::exp(-log_odds));
   if (probability < 0.5) return;
   begin(instrument, tip, gap, evidence.unnoticed && !closes);
+  hand.is_confirmed = !evidence.unnoticed || closes;
   hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, parameters.unconfirmed) : probability);
   answer.begins = true;
 }
