@@ -1,5 +1,5 @@
-"""The network: a small U-Net. It looks at the colours and at their logarithmic ratios relative to those of the whole
-picture: light and shadow leave ratios alone, and most of a picture is tissue."""
+"""The network: a small U-Net. It looks at the colours and at their logarithmic ratios, as they are and relative to those of
+the whole picture: light and shadow leave ratios alone, and most of a picture is tissue."""
 
 import torch
 import torch.nn as nn
@@ -24,7 +24,7 @@ class InstrumentNet(nn.Module):
         self.ratios.weight.data = torch.tensor([[1.0, -1, 0], [0, 1, -1], [1 / 3, 1 / 3, 1 / 3]])[:, :, None, None]
         self.ratios.weight.requires_grad = False
         self.relative = nn.InstanceNorm2d(3, eps=1e-3)
-        self.down1 = block(6, a, 2)
+        self.down1 = block(9, a, 2)
         self.down2 = nn.Sequential(block(a, b, 2), block(b, b))
         self.down3 = nn.Sequential(block(b, c, 2), block(c, c))
         self.down4 = nn.Sequential(block(c, d, 2), block(d, d))
@@ -37,8 +37,8 @@ class InstrumentNet(nn.Module):
         nn.init.constant_(self.logits.bias, -1.5)
 
     def forward(self, rgb):
-        relative = self.relative(self.ratios(torch.log(rgb + 0.06)))
-        x1 = self.down1(torch.cat([(rgb - 0.4) * 4.0, relative], 1))
+        ratios = self.ratios(torch.log(rgb + 0.06))
+        x1 = self.down1(torch.cat([(rgb - 0.4) * 4.0, self.relative(ratios), ratios], 1))
         x2 = self.down2(x1)
         x3 = self.down3(x2)
         x4 = self.down4(x3)

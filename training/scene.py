@@ -5,6 +5,8 @@ import numpy as np
 
 from canvas import COLUMNS, HEIGHT, ROWS, WIDTH, blur, colour, mix, noise, patch, soft_step
 from instruments import draw_instrument
+from organs import organs, pinned_pad
+from robotic import draw_robotic
 from tissue import background, thread
 
 
@@ -53,7 +55,7 @@ def smoke(rng, picture):
 
 def camera(rng, picture):
     """Exposure, white balance, fall-off of the light, gamma, saturation, focus and sharpening."""
-    picture = picture * (rng.uniform(0.6, 1.4) * colour(rng, (0.8, 1, 0.85), (1.2, 1.0001, 1.2)))
+    picture = picture * (rng.uniform(0.7, 1.35) * colour(rng, (0.92, 1, 0.94), (1.08, 1.0001, 1.07)))
     if rng.random() < 0.4:
         x, y = rng.uniform(0.2, 0.8) * WIDTH, rng.uniform(0.2, 0.8) * HEIGHT
         away = np.clip(np.hypot(COLUMNS - x, ROWS - y) / rng.uniform(130, 230), 0, 1) ** rng.uniform(1, 2.5)
@@ -65,7 +67,7 @@ def camera(rng, picture):
         gamma = float(np.clip(np.log(rng.uniform(0.26, 0.6)) / np.log(mean), 0.45, 1.6))
     picture = 255 * (picture / 255) ** gamma
     level = picture.mean(2, keepdims=True)
-    picture = level + (picture - level) * rng.uniform(0.5, 1.5)
+    picture = level + (picture - level) * rng.uniform(0.7, 1.45)
     if rng.random() < 0.3:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.4, 1.8))
     if rng.random() < 0.4:
@@ -100,10 +102,12 @@ def burnt_in_text(rng, picture):
 def training_picture(seed, pictures):
     """BGR picture and mask, 8-bit, HEIGHT x WIDTH; the same for the same seed and pictures."""
     rng = np.random.default_rng(seed)
-    picture = np.clip(background(rng, pictures), 0, 255)
+    kind = rng.random()
+    picture = organs(rng) if kind < 0.55 else pinned_pad(rng) if kind < 0.77 else background(rng, pictures)
+    picture = np.clip(picture, 0, 255)
     cover = np.zeros((HEIGHT, WIDTH), np.float32)
     for _ in range(rng.choice([0, 1, 2, 3], p=[0.1, 0.5, 0.32, 0.08])):
-        drawn, own, tip, width = draw_instrument(rng, picture)
+        drawn, own, tip, width = (draw_robotic if rng.random() < 0.7 else draw_instrument)(rng, picture)
         if rng.random() < 0.15:
             own = behind_tissue(rng, own, tip, width)
         if rng.random() < 0.55:
@@ -112,7 +116,7 @@ def training_picture(seed, pictures):
         cover = np.maximum(cover, own)
     for _ in range(rng.integers(1, 3) if rng.random() < 0.2 else 0):
         picture = thread(rng, picture)
-    if rng.random() < 0.7:
+    if rng.random() < 0.4:
         picture = highlights(rng, picture, cover)
     if rng.random() < 0.15:
         picture = smoke(rng, picture)

@@ -22,7 +22,7 @@ def load_pictures(folder):
 
 
 def tint(rng):
-    return TISSUE[rng.integers(len(TISSUE))] * rng.uniform(0.6, 1.25) * colour(rng, (0.85,) * 3, (1.15,) * 3)
+    return TISSUE[rng.integers(len(TISSUE))] * rng.uniform(0.6, 1.25) * colour(rng, (0.93,) * 3, (1.07,) * 3)
 
 
 def relief(rng, height_field, strength):
@@ -199,9 +199,9 @@ def background(rng, pictures):
         picture = mix(picture, surface(), patch(rng))
     if rng.random() < 0.35:
         picture = loop(rng, picture)
-    if rng.random() < 0.10:
+    if rng.random() < 0.04:
         picture = mix(picture, cloth_or_board(rng), patch(rng)) if rng.random() < 0.5 else cloth_or_board(rng)
-    if rng.random() < 0.10:
+    if rng.random() < 0.05:
         picture = mix(picture, cloth_or_board(rng), straight_edge(rng))
     if rng.random() < 0.30:
         picture = dark_cavity(rng, picture)

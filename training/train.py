@@ -20,8 +20,8 @@ import torch.nn.functional as F
 from network import InstrumentNet
 
 BATCH = 8
-RATE = 4e-3
-SMALL_UNTIL = 0.6  # of the steps
+RATE = 3e-3
+SMALL_UNTIL = 0.8  # of the steps
 SMALL, LARGE = (192, 128), (320, 192)  # width, height
 AVERAGE_DECAY = 0.995
 
@@ -46,7 +46,7 @@ def example(rng, pool, size):
     """RGB 0..1 and mask 0..1 of `size`: cut out, mirrored, with another exposure and white balance."""
     drawn = pool.sample(rng)
     rows, columns = drawn.shape[:2]
-    high = rng.integers(int(0.5 * rows), rows + 1)
+    high = rng.integers(int(0.65 * rows), rows + 1)
     wide = min(columns, int(high * rng.uniform(1.1, 1.8)))
     top, left = rng.integers(0, rows - high + 1), rng.integers(0, columns - wide + 1)
     part = cv2.resize(np.ascontiguousarray(drawn[top : top + high, left : left + wide]), size,
@@ -57,7 +57,7 @@ def example(rng, pool, size):
         part = part[::-1]
     rgb, mask = part[..., 2::-1].astype(np.float32) / 255, part[..., 3].astype(np.float32) / 255
     if rng.random() < 0.7:
-        rgb = np.clip(rgb * rng.uniform(0.8, 1.25, 3).astype(np.float32), 0, 1) ** np.float32(rng.uniform(0.75, 1.3))
+        rgb = np.clip(rgb * rng.uniform(0.95, 1.06, 3).astype(np.float32), 0, 1) ** np.float32(rng.uniform(0.8, 1.25))
     if rng.random() < 0.15:
         rgb = np.clip(rgb + rng.normal(0, 0.02, rgb.shape).astype(np.float32), 0, 1)
     return rgb, mask
