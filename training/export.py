@@ -1,6 +1,9 @@
 """Writes a checkpoint's weights as ONNX (opset 11, input of any size) and compares OpenCV's answer with torch's.
 
-    python3 export.py CHECKPOINT OUT.onnx
+    python3 export.py CHECKPOINT OUT.onnx [EARLIER SHARE]
+
+With the checkpoint of an earlier run from which this one went on: the mean of both runs' weights, SHARE of the earlier.
+What either has forgotten the other may know.
 """
 
 import sys
@@ -13,9 +16,14 @@ import torch
 from network import InstrumentNet
 
 
-def main(checkpoint, out):
+def main(checkpoint, out, earlier=None, share=0):
+    weights = torch.load(checkpoint)["average"]
+    if earlier:
+        for name, value in torch.load(earlier)["average"].items():
+            if value.dtype.is_floating_point:
+                weights[name].mul_(1 - float(share)).add_(value, alpha=float(share))
     network = InstrumentNet()
-    network.load_state_dict(torch.load(checkpoint)["average"])
+    network.load_state_dict(weights)
     network.eval()
     picture = torch.rand(1, 3, 192, 320)
     torch.onnx.export(network, picture, out, opset_version=11, input_names=["rgb"], output_names=["logits"],
@@ -37,4 +45,4 @@ def main(checkpoint, out):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    main(*sys.argv[1:5])

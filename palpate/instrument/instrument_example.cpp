@@ -70,11 +70,15 @@ ExampleColours::ExampleColours(const cv::Mat& bgr, const cv::Mat& example, const
   cv::resize(bgr, small, {kLearntWidth, std::max(1, cvRound(scale * bgr.rows))}, 0, 0, cv::INTER_AREA);
   cv::resize(example, sure, small.size(), 0, 0, cv::INTER_NEAREST);
   if (cv::countNonZero(sure) == 0) return;
-  const cv::Mat instrument = grown(small, sure, probability);
-  const cv::Mat with = frequencies(small, instrument) + kFrequent,
-                without = frequencies(small, ~instrument) + kFrequent;
-  cv::log(with / without, evidence_);
-  evidence_ = cv::max(cv::min(evidence_, kMostEvidence), -kMostEvidence);
+  *this = of_found(small, grown(small, sure, probability));
+}
+
+ExampleColours ExampleColours::of_found(const cv::Mat& bgr, const cv::Mat& instrument) {
+  ExampleColours found;
+  const cv::Mat with = frequencies(bgr, instrument) + kFrequent, without = frequencies(bgr, ~instrument) + kFrequent;
+  cv::log(with / without, found.evidence_);
+  found.evidence_ = cv::max(cv::min(found.evidence_, kMostEvidence), -kMostEvidence);
+  return found;
 }
 
 cv::Mat ExampleColours::counted_in(const cv::Mat& bgr, const cv::Mat& probability) const {

@@ -11,10 +11,15 @@ class ExampleColours {
   /// size; may be empty) is what is known without the example.
   ExampleColours(const cv::Mat& bgr, const cv::Mat& example, const cv::Mat& probability);
 
+  /// Learns from what was found in one image: `instrument` (8-bit, of the image's size) is 255 there.
+  static ExampleColours of_found(const cv::Mat& bgr, const cv::Mat& instrument);
+
   /// Probability of the instrument, float, of `probability`'s size, with what the colours say counted in.
   cv::Mat counted_in(const cv::Mat& bgr, const cv::Mat& probability) const;
 
  private:
+  ExampleColours() = default;
+
   cv::Mat evidence_;  ///< log of the ratio of both frequencies, by bin
 };
 

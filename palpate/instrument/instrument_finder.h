@@ -16,7 +16,8 @@ struct FoundInstruments {
   cv::Mat likeness;  ///< 8-bit, 128 at the edge; empty: the colours tell
 };
 
-/// Finds instruments in the images of one eye in the way that the options choose.
+/// Finds instruments in the images of one eye in the way that the options choose. Our network knows more kinds of
+/// pictures than the colours do, which in turn draw the sharper outline: they do so while both find the same.
 class InstrumentFinder {
  public:
   /// `static_bgr`: rectified, of the map frame; `organ_mask`: 255 = surely tissue in it; may be empty.
@@ -34,10 +35,16 @@ class InstrumentFinder {
 
  private:
   SegmentationModel model_;
+  cv::Mat entrance_;  ///< 255 near the border of the picture
   std::optional<SegmentationNetwork> network_;
   std::optional<ExampleColours> example_;
   bool looks_ = true;
+  bool ours_ = false;      ///< the network
+  double agreement_ = -1;  ///< overlap of what our network and the colours found so far; negative: not known
 
+  FoundInstruments find_by_colours(const cv::Mat& bgr);
+
+  cv::Mat corrected(const cv::Mat& bgr, const cv::Mat& probability) const;
   cv::Mat probability(const cv::Mat& bgr) const;
 };
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/instrument/follow_edges.h"
+#include "palpate/instrument/grey_evidence.h"
 #include "tests/instrument/drawn_scene.h"
 
 namespace palpate {
@@ -64,6 +65,38 @@ TEST(InstrumentFinder, LearnsTheColoursOfTheInstrumentThatAnOperatorOutlines) {
   // Without any other knowledge than the example.
   const cv::Mat unknown(image.rows / 4, image.cols / 4, CV_32F, cv::Scalar(0.3));
   const cv::Mat mask = follow_edges(image, colours.counted_in(image, unknown)) >= 128;
+  EXPECT_GT(overlap(mask, truth), 0.8);
+}
+
+TEST(GreyEvidence, LiftsWhatIsGreyAndLowersWhatIsRed) {
+  cv::Mat image(60, 80, CV_8UC3, cv::Scalar(60, 70, 150));
+  const cv::Rect metal(0, 0, 20, 60);
+  image(metal).setTo(cv::Scalar(120, 125, 122));
+  const cv::Mat unsure = grey_counted_in(image, cv::Mat(image.size(), CV_32F, cv::Scalar(0.5)));
+  EXPECT_GT(unsure.at<float>(30, 10), 0.6);
+  EXPECT_LT(unsure.at<float>(30, 60), 0.45);
+  // What the network is sure of stays, and darkness says nothing.
+  EXPECT_LT(grey_counted_in(image, cv::Mat(image.size(), CV_32F, cv::Scalar(0.01))).at<float>(30, 10), 0.5);
+  const cv::Mat dark(image.size(), CV_8UC3, cv::Scalar(5, 5, 5));
+  EXPECT_NEAR(grey_counted_in(dark, cv::Mat(dark.size(), CV_32F, cv::Scalar(0.5))).at<float>(30, 10), 0.5, 1e-6);
+}
+
+TEST(InstrumentFinder, LeavesOutWhatIsSmallOrBeginsNowhereNearTheBorder) {
+  const test::DrawnInstrument instrument;
+  const cv::Mat truth = test::drawn_mask(instrument);
+  cv::Mat image = test::draw_pair({}, instrument, 1).left, shaft, dots = cv::Mat::zeros(image.size(), CV_8U);
+  cv::erode(truth, shaft, cv::Mat::ones(15, 15, CV_8U));
+  cv::circle(dots, {150, 180}, 22, 255, cv::FILLED);
+  cv::circle(dots, {30, 30}, 9, 255, cv::FILLED);
+  ASSERT_EQ(cv::countNonZero(dots & truth), 0);
+  image.setTo(cv::mean(image, shaft), dots);
+  InstrumentFinder finder({}, test::draw_pair({.instrument = false}, {}, 0).left, {});
+  const ExampleColours colours(image, shaft, {});
+  const cv::Mat unknown(image.rows / 4, image.cols / 4, CV_32F, cv::Scalar(0.3));
+  ASSERT_GT(overlap(follow_edges(image, colours.counted_in(image, unknown)) >= 128, dots | truth), 0.7);
+  finder.use(colours);
+  const cv::Mat mask = finder.find(image).mask;
+  EXPECT_EQ(cv::countNonZero(mask & dots), 0);
   EXPECT_GT(overlap(mask, truth), 0.8);
 }
 
