@@ -9,7 +9,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/check_map.h"
-#include "palpate/instrument/segment.h"
+#include "palpate/instrument/instrument_finder.h"
 #include "palpate/stereo/fuse.h"
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/triangulate.h"
@@ -22,7 +22,9 @@ namespace {
 
 /// Organ region without instruments, highlights and the border of the scope.
 cv::Mat tissue_mask(const RectifiedPair& pair, const Rectification& rectification, const cv::Mat& organ_mask) {
-  const cv::Mat instrument = segment_instrument(pair.left, learn_segmentation(pair.left, organ_mask));
+  InstrumentOptions ours;
+  ours.segmentation = "learned";
+  const cv::Mat instrument = InstrumentFinder(ours, pair.left, organ_mask).find(pair.left).mask;
   cv::Mat mask = organ_mask & matchable_mask(pair.left) & rectification.valid_left;
   mask.setTo(0, instrument);
   return mask;

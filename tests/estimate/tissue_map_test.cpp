@@ -5,11 +5,13 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/mesh_files.h"
 #include "palpate/elastic/stress.h"
 #include "palpate/estimate/scene.h"
+#include "palpate/instrument/instrument_finder.h"
 #include "tests/support/reference_data.h"
 
 namespace palpate {
@@ -87,6 +89,21 @@ TEST_F(RenderedUterus, SeveralStillFramesLowerTheDeviationAndTheLastOneIsTheMaps
   EXPECT_EQ(fused.frame, 5);
   EXPECT_GT(fused.report.coverage, 0.9 * one.report.coverage);
   EXPECT_LT(fused.report.median_depth_deviation_mm, 0.95 * one.report.median_depth_deviation_mm);
+}
+
+TEST_F(RenderedUterus, AnInstrumentThatRestsInTheStaticFrameIsNoTissue) {
+  Recording recording(scene_.recording);
+  for (int i = 0; i < 60; ++i) frame_ = *recording.next();
+  InstrumentOptions learned;
+  learned.segmentation = "learned";
+  const RectifiedPair pair = rectify(rectification_, frame_);
+  cv::Mat instrument = InstrumentFinder(learned, pair.left, {}).find(pair.left).mask;
+  cv::erode(instrument, instrument, cv::Mat::ones(5, 5, CV_8U));
+  const TissueMap map = build();
+  instrument &= map.organ_mask;
+  ASSERT_GT(cv::countNonZero(instrument), 500);
+  const cv::Mat& disparity_px = map.disparity.disparity_px;
+  EXPECT_LT(cv::countNonZero((disparity_px == disparity_px) & instrument), 0.02 * cv::countNonZero(instrument));
 }
 
 TEST_F(RenderedUterus, AScanThatDoesNotFitIsRefusedWithItsResidual) {
