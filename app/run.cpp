@@ -17,6 +17,7 @@
 #include "palpate/core/mesh_files.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/force_estimator.h"
+#include "palpate/feedback/map_confidence.h"
 #include "palpate/feedback/map_json.h"
 #include "palpate/feedback/map_preview.h"
 #include "palpate/feedback/overlay.h"
@@ -316,8 +317,12 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
   write_ply(folder / "surface.ply", map.surface);
   write_ply(folder / "cloud.ply", map.cloud);
   write_text(folder / "map.json", map_json(map, built.rectification));
-  if (!cv::imwrite((folder / "preview.png").string(), draw_map_preview(built.frame.left, built.rectification, map)))
-    throw Unfinished(fmt::format("{}: cannot be written", (folder / "preview.png").string()));
+  const auto write_picture = [&folder](const std::string& name, const cv::Mat& picture) {
+    if (!cv::imwrite((folder / name).string(), picture))
+      throw Unfinished(fmt::format("{}: cannot be written", (folder / name).string()));
+  };
+  write_picture("preview.png", draw_map_preview(built.frame.left, built.rectification, map));
+  write_picture("confidence.png", draw_map_confidence(built.frame.left, built.rectification, map));
 }
 
 std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {

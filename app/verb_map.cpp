@@ -39,14 +39,15 @@ void add_map(CLI::App& app) {
     const MapReport& report = built.map.report;
     fmt::print("points       {} ({:.0f} % of the organ region), depth deviation {:.2f} mm median\n",
                report.matched_points, 100 * report.coverage, report.median_depth_deviation_mm);
-    fmt::print("surface      {} triangles\n", built.map.surface.triangles.size());
+    fmt::print("surface      {} triangles, {} other pieces\n", built.map.surface.triangles.size(),
+               built.map.pieces.size() - 1);
     fmt::print("volume       {} tetrahedra, smallest dihedral angle {:.1f} degrees, {} of {} nodes attached\n",
                built.map.mesh.tetrahedra.size(), report.mesh.smallest_dihedral_deg, built.map.fixed_nodes.size(),
                built.map.mesh.nodes_mm.size());
     fmt::print(
-        "time         rectify {:.0f}, match {:.0f}, triangulate {:.0f}, clean {:.0f}, surface {:.0f}, volume "
+        "time         rectify {:.0f}, match {:.0f}, triangulate {:.0f}, edges {:.0f}, surface {:.0f}, volume "
         "{:.0f}, attachments {:.0f} ms\n",
-        report.rectify_ms, report.match_ms, report.triangulate_ms, report.clean_ms, report.surface_ms, report.volume_ms,
+        report.rectify_ms, report.match_ms, report.triangulate_ms, report.edges_ms, report.surface_ms, report.volume_ms,
         report.attachments_ms);
     fmt::print("written to   {}\n", arguments->folder.string());
   });

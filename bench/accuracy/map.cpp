@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "bench/accuracy/edge_scenes.h"
 #include "bench/accuracy/surface_tables.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/scene.h"
@@ -18,7 +19,7 @@
 // The build stage against what is known: surfaces in closed form, counts and angles of the volume, and Phi as a whole.
 //   bench_map                      prints the tables
 //   bench_map docs/map.md          and writes them into the page, between its two markers
-//   bench_map --only surface       one part of them: surface, times, volume, phi
+//   bench_map --only surface       one part of them: surface, times, volume, phi, edges
 namespace {
 
 using namespace palpate;
@@ -124,7 +125,7 @@ std::string phi_row(const std::string& name, const std::filesystem::path& scene_
   return fmt::format(
       "| {} | {}x{} | {} | {:.1f} | {} | {:.0f} | {:.0f} + {:.0f} + {:.0f} + {:.0f} + {:.0f} + {:.0f} + {:.0f} |\n",
       name, recording.size().width, recording.size().height, map.mesh.tetrahedra.size(), r.mesh.smallest_dihedral_deg,
-      fit_to_surface(map.mesh, map.surface), time_ms, r.rectify_ms, r.match_ms, r.triangulate_ms, r.clean_ms,
+      fit_to_surface(map.mesh, map.surface), time_ms, r.rectify_ms, r.match_ms, r.triangulate_ms, r.edges_ms,
       r.surface_ms, r.volume_ms, r.attachments_ms);
 }
 
@@ -132,7 +133,7 @@ std::string phi_table() {
   std::string table =
       "| sequence | image | elements | smallest dihedral angle deg | camera side to S* / back, RMS mm | Phi ms | "
       "rectify + "
-      "match + triangulate + clean + surface + volume + attachments ms |\n|---|---|---|---|---|---|---|\n"
+      "match + triangulate + edges + surface + volume + attachments ms |\n|---|---|---|---|---|---|---|\n"
       "| goal | 960x540 | 1344 | >= 10 | <= 0.3 | <= 1000 | |\n";
   const std::filesystem::path data = test::reference_data();
   setenv("PALPATE_REFERENCE_DATA", std::filesystem::absolute(data).c_str(), 0);
@@ -177,6 +178,7 @@ int main(int argc, char** argv) {
   add("times", "Surface: times", surface_time_table);
   add("volume", "Volume", volume_table);
   add("phi", "Whole Phi", phi_table);
+  add("edges", "Edges", edge_table);
   if (argc == 2) write_into(argv[1], tables);
   return EXIT_SUCCESS;
 }

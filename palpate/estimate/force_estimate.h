@@ -49,7 +49,8 @@ struct ForceEstimate {
 
   /// What the overlay draws: the map as all instruments deform it. Empty where nothing was computed.
   std::vector<Vec3> deformed_nodes_mm;
-  std::vector<Triangle> boundary;  ///< outward triangles of these nodes (finer than the map's around a contact)
+  std::vector<Triangle> boundary;  ///< outward triangles of these nodes that were seen (finer than the map's around a
+                                   ///< contact)
   std::vector<double> node_von_mises_kPa;
   cv::Mat left_instrument_mask;  ///< rectified left image, 255 = instrument
 };

@@ -9,6 +9,7 @@
 #include "palpate/core/stopwatch.h"
 #include "palpate/elastic/stress.h"
 #include "palpate/estimate/map_model.h"
+#include "palpate/estimate/touchable.h"
 #include "palpate/infer/band.h"
 #include "palpate/infer/force_filter.h"
 #include "palpate/observe/picture_quality.h"
@@ -22,6 +23,24 @@ namespace {
 constexpr double kMinPointsObscured = 0.6, kMinPoints = 0.25;
 /// A hidden tip's force is told where its deviation is below this ratio of it.
 constexpr double kTellingDeviation = 0.4;
+
+/// A patch all of whose radius lies beyond the edge of what was seen finds half the tissue to hold it, or all: log 2 at
+/// two deviations.
+constexpr double kEdgeLogDeviation = 0.35;
+/// A tip so near to tissue that is no part of the map touches it: both depths are wrong by that.
+constexpr double kOnTissue_mm = 1;
+/// Tissue that is pulled farther than its attachments are is not told by any law of moderate strain.
+constexpr double kMaxStretch = 1;
+/// A face whose sides grew by this ratio shows no tissue that was seen.
+constexpr double kMaxGrowth = 3;
+
+bool is_sliver(const Triangle& face, const std::vector<Vec3>& rest_mm, const std::vector<Vec3>& now_mm) {
+  for (size_t k = 0; k < 3; ++k) {
+    const auto a = static_cast<size_t>(face[k]), b = static_cast<size_t>(face[(k + 1) % 3]);
+    if ((now_mm[a] - now_mm[b]).norm() > kMaxGrowth * (rest_mm[a] - rest_mm[b]).norm()) return true;
+  }
+  return false;
+}
 
 /// The tissue that was measured at a pixel of the recorded left image; nothing for no pixel. Throws BadInput.
 std::optional<Vec3> place_at(const TissueMap& map, const Rectification& rectification,
@@ -57,6 +76,9 @@ struct ForceEstimator::State {
   PictureWatch pictures;
   TissueTracker tissue;
   ForceFilter filter;
+  Touchable touchable;
+  int drawn_mesh = -1;  ///< version of the mesh whose drawn faces these are
+  std::vector<Triangle> drawn_faces;
 
   State(TissueMap m, const RectifiedPair& rest, const Rectification& r, const InstrumentOptions& instrument,
         const ContactOptions& contact, const InferenceParameters& t, ForceUncertainty u)
@@ -70,7 +92,8 @@ struct ForceEstimator::State {
         instruments(instrument, r, rest, map.organ_mask),
         pictures(rest.left),
         tissue(rest, r, map.disparity.disparity_px, map.organ_mask & r.valid_left),
-        filter(contact_model(map, r, radius_mm), {map.mesh, map.fixed_nodes}, tissue.points(), r, contact, t) {}
+        filter(contact_model(map, r, radius_mm), {map.mesh, map.fixed_nodes}, tissue.points(), r, contact, t),
+        touchable(map, r) {}
 
   /// One row of forces.csv. `tip_known`: seen, or told by the operator.
   void report(const InstrumentAnswer& answer, const FrameAnswer& whole, bool tip_known, ForceEstimate& estimate) {
@@ -85,6 +108,9 @@ struct ForceEstimator::State {
     estimate.total_band = total_band(estimate.band, 0, uncertainty.modulus);
     if (!estimate.in_contact) {
       if (tip_known && !whole.explained) estimate.status = FrameStatus::map_stale;
+      if (tip_known &&
+          (answer.is_off_limits || touchable.is_on_other_tissue(whole.scene.undo(answer.tip_mm), kOnTissue_mm)))
+        estimate.warnings.push_back("contact_outside_map");
       return;
     }
     const Equilibrium& equilibrium = *whole.equilibrium;
@@ -101,9 +127,14 @@ struct ForceEstimator::State {
     estimate.force_N = answer.force_N;
     estimate.mean_nodal_force_N = answer.mean_nodal_force_N;
     estimate.band = force_band(answer.force_N, answer.force_covariance_N2);
+    if (const double beyond = touchable.beyond_edge(answer.place_mm, answer.footprint_mm); beyond > 0) {
+      estimate.warnings.push_back("near_map_edge");
+      estimate.band = total_band(estimate.band, answer.force_N.norm(), kEdgeLogDeviation * beyond);
+    }
     estimate.total_band =
         total_band(estimate.band, answer.force_N.norm(), uncertainty.log_deviation(answer.place_mm, answer.q_mm));
-    estimate.status = whole.explained ? FrameStatus::ok : FrameStatus::map_stale;
+    const bool is_believed = whole.explained && answer.stretch < kMaxStretch;
+    estimate.status = is_believed ? FrameStatus::ok : FrameStatus::map_stale;
     const double half_width_N = 0.5 * (estimate.band.high_N - estimate.band.low_N);
     if (!answer.tip_inferred || half_width_N < 2 * kTellingDeviation * estimate.force_N.norm()) return;
     estimate.status = FrameStatus::tool_lost;
@@ -112,16 +143,21 @@ struct ForceEstimator::State {
     estimate.mean_nodal_force_N = 0;
   }
 
-  /// The deformed surface for drawing, where it lies now, and its stress.
-  void show(const FrameAnswer& answer, ForceEstimate& estimate) const {
+  /// The deformed surface that was seen, for drawing, where it lies now, and its stress.
+  void show(const FrameAnswer& answer, ForceEstimate& estimate) {
     const TetModel& model = filter.model().model();
     const Eigen::VectorXd& u = answer.equilibrium->u;
-    estimate.boundary = filter.model().boundary();
+    if (drawn_mesh != filter.model().mesh_version()) {
+      drawn_mesh = filter.model().mesh_version();
+      drawn_faces = touchable.seen_faces(model.rest_mm(), filter.model().boundary());
+    }
     estimate.deformed_nodes_mm = model.rest_mm();
     for (size_t n = 0; n < estimate.deformed_nodes_mm.size(); ++n) {
       Vec3& node = estimate.deformed_nodes_mm[n];
       node = answer.scene.apply(node + u.segment<3>(3 * static_cast<Eigen::Index>(n)));
     }
+    for (const Triangle& face : drawn_faces)
+      if (!is_sliver(face, model.rest_mm(), estimate.deformed_nodes_mm)) estimate.boundary.push_back(face);
     estimate.node_von_mises_kPa = node_von_mises_kPa(model, u);
     const double max_kPa = *std::max_element(estimate.node_von_mises_kPa.begin(), estimate.node_von_mises_kPa.end());
     if (estimate.in_contact) estimate.max_von_mises_kPa = max_kPa;
@@ -166,12 +202,14 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   const InstrumentObservations instruments = s.instruments.update(pair);
   estimate.left_instrument_mask = instruments.left_mask;
   const bool after_map = frame.index > s.map.frame;
+  if (after_map) s.touchable.look(instruments.left_mask);
   FrameEvidence evidence;
   evidence.time_s = frame.time_s;
   evidence.tips = instruments.tips;
   evidence.may_touch = after_map && !quality.repeated;
   if (frame.index >= s.held_from_frame) evidence.held_at_mm = s.held_at_mm;
   evidence.held_for_sure = frame.index == s.held_from_frame;
+  evidence.may_be_held = [&s](const Vec3& place_mm) { return s.touchable.may_be_held(place_mm); };
   std::vector<TissuePoint> wanted;
   if (after_map) {
     wanted = s.filter.wanted_points();

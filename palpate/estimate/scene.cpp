@@ -102,8 +102,12 @@ void describe(Settings& settings, Scene& scene) {
   settings.group("uncertainty", "what is not known of the tissue, one standard deviation each: widens the total band",
                  [&scene](Settings& group) { describe(group, scene.uncertainty); });
   settings.group(
-      "tuning", "numbers that the inference decides by (docs/inference.md)",
-      [&scene](Settings& group) { describe(group, scene.tuning); }, &scene.has_tuning);
+      "tuning", "numbers that the inference (docs/inference.md) and the map (docs/map.md) decide by",
+      [&scene](Settings& group) {
+        describe(group, scene.tuning);
+        describe(group, scene.map.edges);
+      },
+      &scene.has_tuning);
   settings.after_reading([&scene] {
     if (!scene.contact.at_px.empty() && (scene.instrument.segmentation != "none" || !scene.instrument.track.empty()))
       throw BadInput(

@@ -9,12 +9,11 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/check_map.h"
+#include "palpate/estimate/find_edges.h"
 #include "palpate/instrument/instrument_finder.h"
 #include "palpate/stereo/fuse.h"
 #include "palpate/stereo/quasi_dense.h"
 #include "palpate/stereo/triangulate.h"
-#include "palpate/surface/cocone.h"
-#include "palpate/surface/extend_rim.h"
 
 namespace palpate {
 
@@ -95,14 +94,16 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   TissueMap map;
   map.tissue = tissue;
   map.element = options.element;
+  map.is_given = !options.volume.empty();
   map.frame = frame.index;
   Stopwatch watch;
   map.organ_mask = rectified_polygon_mask(rectification, options.organ_region_px);
   RectifiedPair pair;
+  cv::Mat mask;
   std::vector<DisparityMap> disparities;
   for (const StereoFrame& one : static_frames) {
     pair = rectify(rectification, one);
-    const cv::Mat mask = tissue_mask(pair, rectification, map.organ_mask);
+    mask = tissue_mask(pair, rectification, map.organ_mask);
     map.report.rectify_ms += watch.lap_ms();
     disparities.push_back(match(pair, rectification, mask, options.match));
     map.report.match_ms += watch.lap_ms();
@@ -113,17 +114,21 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   map.cloud = triangulate(map.disparity, rectification, pair.left);
   map.report.triangulate_ms = watch.lap_ms();
 
-  const double spacing_mm = spacing_for(map.cloud, rectification, options);
-  const PointCloud points = clean_points(map.cloud, spacing_mm, options.surface);
-  map.report.clean_ms = watch.lap_ms();
+  const cv::Mat covered = map.organ_mask & rectification.valid_left & ~mask;
+  const DepthEdges edges = find_edges(map.cloud, rectification, covered, options.edges);
+  std::vector<PointCloud> groups = split_at_edges(map.cloud, edges);
+  map.report.edges_ms = watch.lap_ms();
 
-  map.surface = extend_rim(cocone(points.position_mm, options.surface), map.cloud.position_mm, spacing_mm);
+  const double spacing_mm = spacing_for(groups.front(), rectification, options);
+  map.pieces = cut_surfaces(std::move(groups), edges, spacing_mm, options.surface);
+  map.surface = map.pieces.front().surface;
+  map.seen = seen_tissue(map.surface, edges.cells);
   map.report.surface_ms = watch.lap_ms();
 
   Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
                                         : read_body(options.volume, options.volume_unit);
   if (options.register_volume) {
-    map.report.registration = register_to(points, options, body);
+    map.report.registration = register_to(map.pieces.front().clean, options, body);
     map.report.register_ms = watch.lap_ms();
   }
   if (!options.volume.empty())

@@ -10,7 +10,8 @@
 #include "palpate/estimate/tissue_labels.h"
 #include "palpate/stereo/match.h"
 #include "palpate/stereo/rig.h"
-#include "palpate/surface/clean_points.h"
+#include "palpate/surface/cut_surface.h"
+#include "palpate/surface/seen_tissue.h"
 #include "palpate/volume/attachments.h"
 #include "palpate/volume/body.h"
 #include "palpate/volume/register_body.h"
@@ -42,13 +43,14 @@ struct MapOptions {
   Element element = Element::averaged;
   MatchOptions match;
   SurfaceOptions surface;
+  EdgeOptions edges;  ///< keys of `tuning`
 };
 
 void describe(Settings& settings, MapOptions& options);
 
 /// What the build stage took and left, for map.json.
 struct MapReport {
-  double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, clean_ms = 0, surface_ms = 0, register_ms = 0, volume_ms = 0,
+  double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, edges_ms = 0, surface_ms = 0, register_ms = 0, volume_ms = 0,
          attachments_ms = 0;
   int matched_points = 0;
   double coverage = 0;  ///< share of the organ region with a measured disparity
@@ -59,12 +61,15 @@ struct MapReport {
 
 /// V of Eq. 1 and everything seen on the way to it.
 struct TissueMap {
-  PointCloud cloud;               ///< S
-  Surface surface;                ///< S*
-  TetMesh mesh;                   ///< V
-  std::vector<int> fixed_nodes;   ///< b
-  AttachmentOptions attachments;  ///< where b was taken from, for meshes that are finer somewhere
-  TissueOptions tissue;           ///< gamma
+  PointCloud cloud;                  ///< S
+  Surface surface;                   ///< S*
+  std::vector<SurfacePiece> pieces;  ///< S* first; what else was seen can be touched, but is no part of V
+  SeenTissue seen;                   ///< which places of S* were seen
+  bool is_given = false;             ///< V is a scan, not what was seen with a thickness
+  TetMesh mesh;                      ///< V
+  std::vector<int> fixed_nodes;      ///< b
+  AttachmentOptions attachments;     ///< where b was taken from, for meshes that are finer somewhere
+  TissueOptions tissue;              ///< gamma
   Element element = Element::averaged;
   DisparityMap disparity;
   cv::Mat organ_mask;  ///< 255 = organ region, rectified left image

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "palpate/feedback/map_confidence.h"
+
 namespace palpate {
 
 std::string map_json(const TissueMap& map, const Rectification& rectification) {
@@ -18,13 +20,22 @@ std::string map_json(const TissueMap& map, const Rectification& rectification) {
                     {"elements", map.mesh.tetrahedra.size()},
                     {"fixed_nodes", map.fixed_nodes.size()}};
   json["times_ms"] = {
-      {"rectify", r.rectify_ms}, {"match", r.match_ms},   {"triangulate", r.triangulate_ms}, {"clean", r.clean_ms},
+      {"rectify", r.rectify_ms}, {"match", r.match_ms},   {"triangulate", r.triangulate_ms}, {"edges", r.edges_ms},
       {"surface", r.surface_ms}, {"volume", r.volume_ms}, {"attachments", r.attachments_ms}};
   if (!map.disparity.warnings.empty()) json["warnings"] = map.disparity.warnings;
   json["coverage"] = r.coverage;
   json["median_depth_deviation_mm"] = r.median_depth_deviation_mm;
   json["smallest_dihedral_deg"] = r.mesh.smallest_dihedral_deg;
   json["cell_size_mm"] = r.mesh.cell_size_mm;
+  for (const SurfacePiece& piece : map.pieces) {
+    nlohmann::ordered_json outline = nlohmann::ordered_json::array();
+    for (const cv::Point2d& corner : outline_px(piece.surface, rectification.rig))
+      outline.push_back({std::round(10 * corner.x) / 10, std::round(10 * corner.y) / 10});
+    json["pieces"].push_back({{"organ", json["pieces"].empty()},
+                              {"area_mm2", piece.area_mm2},
+                              {"depth_mm", piece.depth_mm},
+                              {"outline_px", outline}});
+  }
   if (r.registration) {
     nlohmann::ordered_json rotation;
     for (int i = 0; i < 3; ++i) {

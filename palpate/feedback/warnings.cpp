@@ -9,6 +9,8 @@ const std::vector<std::pair<std::string, std::string>>& known_warnings() {
       {"law_out_of_range", "tissue deformed beyond the law's range"},
       {"inverted_elements", "elements of the map turned inside out"},
       {"near_attachment", "contact close to where the tissue is held"},
+      {"near_map_edge", "contact at the edge of the tissue that was seen"},
+      {"contact_outside_map", "the tip touches tissue that is not in the map"},
       {"modulus_unknown", "Young's modulus unknown: force in N per kPa"},
       {"tip_inferred", "tip hidden, the tissue tells the force"},
       {"camera_missing", "one camera has no picture"},

@@ -27,7 +27,9 @@ void FilterState::report(size_t instrument, const ContactFit& fit, const TipObse
   answer.footprint_mm = std::exp(fit.posterior.log_radius(k));
   answer.tip_inferred = !tip.visible;
   answer.tip_mm = scene.apply(model.footprint(k).center_mm + fit.posterior.q_mm(k));
-  answer.near_attachment = model.distance_to_attachments_mm(k) < 2 * options.footprint_radius_mm;
+  const double attachments_mm = model.distance_to_attachments_mm(k);
+  answer.near_attachment = attachments_mm < 2 * options.footprint_radius_mm;
+  answer.stretch = answer.q_mm.norm() / std::max(attachments_mm, 5 * options.footprint_radius_mm);
 }
 
 double FilterState::misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {

@@ -69,7 +69,7 @@ struct FilterState {
   /// The contact begins where the operator says; whether it holds is for the tissue to tell.
   void begin_told(size_t instrument, const FrameEvidence& frame);
   /// Where a tip without contact stands against the surface, and whether it touches.
-  void look_for_touch(size_t instrument, const TipObservation& tip, double seconds, InstrumentAnswer& answer);
+  void look_for_touch(size_t instrument, const FrameEvidence& frame, double seconds, InstrumentAnswer& answer);
   void release(size_t instrument, const Belief& without);
 
   // score_holds.cpp: which hypothesis explains the frame

@@ -116,7 +116,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
       continue;
     }
     if (!hand.contact && frame.may_touch) {
-      s.look_for_touch(i, tip, seconds, answer.instruments[i]);
+      s.look_for_touch(i, frame, seconds, answer.instruments[i]);
       if (hand.contact && hand.filter.most_probable() != Hold::free) {
         fit.posterior = fit.kept = s.belief;
         fit.converged = s.body->response.equilibrium.converged;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -23,6 +24,8 @@ struct FrameEvidence {
   /// Where the first instrument, which is not looked for, may hold the tissue: place at rest; empty = nowhere.
   std::optional<Vec3> held_at_mm;
   bool held_for_sure = false;  ///< it does hold it, from this frame on
+  /// Whether a contact may begin at a place at rest; empty = everywhere.
+  std::function<bool(const Vec3& place_mm)> may_be_held;
 };
 
 /// What is believed of one instrument.
@@ -40,6 +43,8 @@ struct InstrumentAnswer {
   double footprint_mm = 0;
   double misfit_mm = 0;
   bool near_attachment = false;
+  double stretch = 0;          ///< displacement of the patch over how far the attachments, or five radii, are
+  bool is_off_limits = false;  ///< a contact would begin where none may
 };
 
 struct FrameAnswer {

@@ -71,9 +71,10 @@ void FilterState::begin(size_t instrument, const TipObservation& tip, const Gap&
   hand.slid_from_mm = belief.offset_mm(*hand.contact);
 }
 
-void FilterState::look_for_touch(size_t instrument, const TipObservation& tip, double seconds,
+void FilterState::look_for_touch(size_t instrument, const FrameEvidence& frame, double seconds,
                                  InstrumentAnswer& answer) {
   Hand& hand = hands[instrument];
+  const TipObservation& tip = frame.tips[instrument];
   const Vec3 tip_mm = belief.scene(about_mm).undo(tip.tip_mm);
   const Gap gap = gap_of(tip_mm);
   if (hand.released_at_mm &&
@@ -95,6 +96,8 @@ void FilterState::look_for_touch(size_t instrument, const TipObservation& tip, d
   if (closes) log_odds = parameters.told_log_odds;
   const double probability = 1 / (1 + std::exp(-log_odds));
   if (probability < 0.5) return;
+  answer.is_off_limits = frame.may_be_held && !frame.may_be_held(place_at_rest(gap));
+  if (answer.is_off_limits) return;
   begin(instrument, tip, gap, evidence.unnoticed && !closes);
   hand.is_confirmed = !evidence.unnoticed || closes;
   hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, parameters.unconfirmed) : probability);

@@ -22,9 +22,22 @@ double rim_length(const Mesh& mesh, Halfedge start) {
   return length;
 }
 
+/// Whether something else shows in a hole: on a third of the ways across it.
+bool is_window(const Mesh& mesh, Halfedge start, const DepthEdges& edges) {
+  std::vector<Vec3> rim;
+  for (Halfedge h : CGAL::halfedges_around_face(start, mesh)) {
+    const auto& p = mesh.point(mesh.target(h));
+    rim.emplace_back(p.x(), p.y(), p.z());
+  }
+  const size_t half = rim.size() / 2;
+  size_t behind = 0;
+  for (size_t i = 0; i < half; ++i) behind += shows_another_depth(edges, rim[i], rim[i + half]);
+  return 3 * behind > half;
+}
+
 }  // namespace
 
-Surface close_holes(const Surface& surface, double longest_rim_mm) {
+Surface close_holes(const Surface& surface, double longest_rim_mm, const DepthEdges* edges) {
   Mesh mesh;
   for (const Vec3& p : surface.vertices_mm) mesh.add_vertex({p.x(), p.y(), p.z()});
   for (const Triangle& t : surface.triangles)
@@ -37,6 +50,7 @@ Surface close_holes(const Surface& surface, double longest_rim_mm) {
   const auto outer = std::max_element(lengths.begin(), lengths.end()) - lengths.begin();
   for (size_t i = 0; i < rims.size(); ++i) {
     if (static_cast<std::ptrdiff_t>(i) == outer || lengths[i] > longest_rim_mm) continue;
+    if (edges && is_window(mesh, rims[i], *edges)) continue;
     std::vector<Mesh::Face_index> faces;
     std::vector<Mesh::Vertex_index> inner;
     PMP::triangulate_refine_and_fair_hole(mesh, rims[i], std::back_inserter(faces), std::back_inserter(inner));

@@ -150,7 +150,8 @@ bool meets_cocone(const Vec3& p, const Vec3& pole, const VoronoiVertex& one, con
 }
 
 std::vector<Triangle> candidate_triangles(const Delaunay& delaunay, const std::vector<Vec3>& points,
-                                          const std::vector<Vec3>& poles, double longest_edge) {
+                                          const std::vector<Vec3>& poles, double longest_edge,
+                                          const DepthEdges* edges) {
   std::vector<Triangle> candidates;
   for (auto facet = delaunay.finite_facets_begin(); facet != delaunay.finite_facets_end(); ++facet) {
     const auto cell = facet->first;
@@ -163,6 +164,8 @@ std::vector<Triangle> candidate_triangles(const Delaunay& delaunay, const std::v
       is_candidate = (points[a] - points[b]).norm() <= longest_edge &&
                      meets_cocone(points[a], poles[a], cell->info(), cell->neighbor(facet->second)->info());
     }
+    for (size_t k = 0; k < 3 && is_candidate && edges; ++k)
+      is_candidate = !is_torn(*edges, points[static_cast<size_t>(t[k])], points[static_cast<size_t>(t[(k + 1) % 3])]);
     if (is_candidate) candidates.push_back(t);
   }
   return candidates;
@@ -170,7 +173,7 @@ std::vector<Triangle> candidate_triangles(const Delaunay& delaunay, const std::v
 
 }  // namespace
 
-Surface cocone(const std::vector<Vec3>& points_mm, const SurfaceOptions& options) {
+Surface cocone(const std::vector<Vec3>& points_mm, const SurfaceOptions& options, const DepthEdges* edges) {
   std::vector<std::pair<Kernel::Point_3, int>> numbered;
   for (size_t i = 0; i < points_mm.size(); ++i)
     if (points_mm[i].allFinite())
@@ -190,10 +193,10 @@ Surface cocone(const std::vector<Vec3>& points_mm, const SurfaceOptions& options
   Surface surface;
   surface.vertices_mm = points_mm;
   surface.triangles = extract_manifold(
-      points_mm, candidate_triangles(delaunay, points_mm, poles, kLongestEdge * neighbours.spacing_mm));
+      points_mm, candidate_triangles(delaunay, points_mm, poles, kLongestEdge * neighbours.spacing_mm, edges));
   if (surface.triangles.empty())
     throw BadInput(fmt::format("no surface through {} points: no three neighbours form a surface", points_mm.size()));
-  return close_holes(without_unused_vertices(surface), std::numbers::pi * options.largest_hole_mm);
+  return close_holes(without_unused_vertices(surface), std::numbers::pi * options.largest_hole_mm, edges);
 }
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "palpate/core/geometry.h"
+#include "palpate/surface/depth_edges.h"
 
 namespace palpate {
 
@@ -11,7 +12,8 @@ namespace palpate {
 std::vector<Triangle> extract_manifold(const std::vector<Vec3>& points_mm, const std::vector<Triangle>& candidates);
 
 /// Closes the holes of a vertex-manifold surface whose rim is shorter than `longest_rim_mm` with patches that continue
-/// it smoothly; the longest rim is the outer boundary and stays open.
-Surface close_holes(const Surface& surface, double longest_rim_mm);
+/// it smoothly; the longest rim is the outer boundary and stays open, and so does, with `edges`, a hole through which
+/// something else is seen.
+Surface close_holes(const Surface& surface, double longest_rim_mm, const DepthEdges* edges = nullptr);
 
 }  // namespace palpate

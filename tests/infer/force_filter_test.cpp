@@ -132,6 +132,22 @@ ForceFilter filter_for(const Made& made, double stated_radius_mm, Drive drive = 
   return ForceFilter(ContactModel(slab, kTissue, Element::averaged), slab({}), made.points(), da_vinci(), contact);
 }
 
+TEST(ForceFilter, NoContactBeginsWhereNoneMay) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  bool ever_held = false, was_refused = false;
+  for (int i = 0; i < 20; ++i) {
+    const double height_mm = i < 12 ? 0.15 * (12 - i) * (12 - i) : 0;
+    FrameEvidence frame = made.frame(i, Vec3(0, 0, -height_mm), Vec3::Zero(), false);
+    frame.may_be_held = [](const Vec3& place_mm) { return place_mm.x() > kPlace_mm.x() + 5; };
+    const InstrumentAnswer answer = filter.update(frame).instruments[0];
+    ever_held |= answer.hold != Hold::free;
+    was_refused |= answer.is_off_limits;
+  }
+  EXPECT_FALSE(ever_held);
+  EXPECT_TRUE(was_refused);
+}
+
 TEST(ForceFilter, FindsTheForceOfAPull) {
   Made made;
   ForceFilter filter = filter_for(made, kTrueRadius_mm);
