@@ -46,8 +46,9 @@ void describe(Settings& settings, MapOptions& options) {
   settings.number("thickness_mm", options.thickness_mm, {0, 500, true, false},
                   "depth of the body behind its visible surface, along the optical axis; of a rounded organ the mean "
                   "(volume over shadow)");
-  settings.path("volume", options.volume,
-                "instead of the thickness: the organ from a scan (.msh .vtk .vtu .obj .ply .stl), left camera frame");
+  settings.path(
+      "volume", options.volume,
+      "instead of the thickness: the organ from a scan (.msh .vtk .vtu .vtp .obj .ply .stl), left camera frame");
   settings.choice<LengthUnit>("volume_unit", options.volume_unit, {{"mm", LengthUnit::mm}, {"m", LengthUnit::m}},
                               "unit of length of that file");
   settings.choice<Element>(

@@ -5,11 +5,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <map>
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/table_text.h"
+#include "palpate/volume/body_remarks.h"
+#include "palpate/volume/mesh_bytes.h"
 
 namespace palpate {
 
@@ -102,6 +106,56 @@ const std::vector<MeshKind>& registry() {
   return kKinds;
 }
 
+bool is_inverted(const CellSoup& soup, const std::vector<int>& tetrahedron) {
+  std::array<Vec3, 4> corners;
+  for (size_t k = 0; k < 4; ++k) {
+    const int node = k < tetrahedron.size() ? tetrahedron[k] : -1;
+    if (node < 0 || node >= static_cast<int>(soup.points.size())) return false;
+    corners[k] = soup.points[static_cast<size_t>(node)];
+  }
+  return signed_volume_mm3(corners[0], corners[1], corners[2], corners[3]) < 0;
+}
+
+/// Gmsh's names of parts of the volume, in quotes.
+std::vector<std::string> physical_volumes(std::string_view bytes) {
+  std::vector<std::string> names;
+  const size_t section = bytes.find("$PhysicalNames");
+  if (section == std::string_view::npos) return names;
+  MeshBytes lines(bytes.substr(section));
+  lines.line();
+  lines.line();
+  for (std::string_view line = lines.line(); !line.empty() && !line.starts_with('$'); line = lines.line()) {
+    MeshBytes words(line);
+    const bool is_volume = words.word() == "3";
+    words.word();
+    if (is_volume) names.emplace_back(trimmed(words.line()));
+  }
+  return names;
+}
+
+/// `use(kind, bytes)` of a file, by its ending; what goes wrong is told with its name.
+template <class Use>
+auto of_file(const std::filesystem::path& file, const Use& use) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(fmt::format("{} {}, expected a volume or a closed surface", file.string(), obstacle));
+  std::ostringstream stream;
+  stream << std::ifstream(file, std::ios::binary).rdbuf();
+  const std::string bytes = stream.str();
+  for (const MeshKind& kind : registry()) {
+    if (std::find(kind.extensions.begin(), kind.extensions.end(), extension) == kind.extensions.end()) continue;
+    try {
+      return use(kind, bytes);
+    } catch (const std::exception& error) {
+      throw BadInput(fmt::format("{} cannot be read: {}", file.string(), error.what()));
+    }
+  }
+  throw BadInput(fmt::format("{}: unknown kind of file '{}', expected .msh .vtk .vtu .vtp .obj .ply or .stl",
+                             file.string(), extension));
+}
+
 }  // namespace
 
 std::vector<InputKind> mesh_kinds() {
@@ -113,7 +167,9 @@ std::vector<InputKind> mesh_kinds() {
   kinds.push_back(
       {"cells", "",
        "tetrahedra, hexahedra, voxels, wedges, pyramids (their boundary is taken), else triangles, quadrilaterals, "
-       "polygons, strips; of a higher order the corners; inverted tetrahedra are turned; polyhedra are refused"});
+       "polygons, strips; of a higher order the corners; inverted tetrahedra are turned; both are said, and physical "
+       "groups "
+       "that are not used; polyhedra are refused"});
   kinds.push_back(
       {"corners", "",
        "those nearer than three millionths of the mesh's extent, or of its distance from the origin, are one"});
@@ -136,10 +192,7 @@ Surface skin_of(const CellSoup& soup) {
     if (type == 11 && cell.size() >= 8) std::swap(cell[2], cell[3]), std::swap(cell[6], cell[7]);  // a voxel
     if (static_cast<int>(cell.size()) < corners_of(found->second))
       throw BadInput(fmt::format("cell {} has {} nodes, too few for its type", i, cell.size()));
-    if (type == 10 && cell.size() >= 4) {
-      const auto point = [&](size_t k) -> const Vec3& { return soup.points[static_cast<size_t>(cell[k])]; };
-      if (signed_volume_mm3(point(0), point(1), point(2), point(3)) < 0) std::swap(cell[2], cell[3]);
-    }
+    if (type == 10 && is_inverted(soup, cell)) std::swap(cell[2], cell[3]);
     for (const std::vector<int>& corners : found->second) {
       std::vector<int> face;
       for (int corner : corners) face.push_back(cell[static_cast<size_t>(corner)]);
@@ -169,24 +222,30 @@ Surface skin_of(const CellSoup& soup) {
 }
 
 Surface read_polygon_soup(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
-    throw BadInput(fmt::format("{} {}, expected a volume or a closed surface", file.string(), obstacle));
-  std::ostringstream stream;
-  stream << std::ifstream(file, std::ios::binary).rdbuf();
-  const std::string bytes = stream.str();
-  for (const MeshKind& kind : registry()) {
-    if (std::find(kind.extensions.begin(), kind.extensions.end(), extension) == kind.extensions.end()) continue;
-    try {
-      return skin_of(kind.read(bytes));
-    } catch (const std::exception& error) {
-      throw BadInput(fmt::format("{} cannot be read: {}", file.string(), error.what()));
+  return of_file(file, [](const MeshKind& kind, const std::string& bytes) { return skin_of(kind.read(bytes)); });
+}
+
+std::vector<std::string> body_remarks(const std::filesystem::path& file) {
+  return of_file(file, [&](const MeshKind& kind, const std::string& bytes) {
+    const CellSoup soup = kind.read(bytes);
+    size_t turned = 0, curved = 0;
+    for (size_t i = 0; i < soup.cells.size(); ++i) {
+      const auto faces = faces_of_cells().find(soup.types[i] == 11 ? 12 : linear_type(soup.types[i]));
+      if (faces == faces_of_cells().end()) continue;
+      turned += faces->first == 10 && is_inverted(soup, soup.cells[i]);
+      curved += static_cast<int>(soup.cells[i].size()) > corners_of(faces->second);
     }
-  }
-  throw BadInput(fmt::format("{}: unknown kind of file '{}', expected .msh .vtk .vtu .vtp .obj .ply or .stl",
-                             file.string(), extension));
+    std::vector<std::string> remarks;
+    if (turned > 0) remarks.push_back(fmt::format("{}: {} inverted tetrahedra were turned", file.string(), turned));
+    if (curved > 0)
+      remarks.push_back(fmt::format("{}: of {} elements of higher order the corners are used", file.string(), curved));
+    if (const auto groups = physical_volumes(bytes); !groups.empty())
+      remarks.push_back(
+          fmt::format("{}: the physical groups {} are not used, the whole is one tissue (map.labels says where "
+                      "it differs)",
+                      file.string(), fmt::join(groups, ", ")));
+    return remarks;
+  });
 }
 
 }  // namespace palpate

@@ -11,6 +11,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/core/mesh_files.h"
+#include "palpate/volume/body_remarks.h"
 #include "palpate/volume/inside.h"
 #include "tests/support/reference_data.h"
 #include "tests/volume/shapes.h"
@@ -143,6 +144,23 @@ TEST_F(ReadBody, ReadsGmsh2WithTagsAndAnInvertedElement) {
            std::string("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n10 0 0 50\n20 6 0 50\n30 0 6 50\n40 0 0 "
                        "56\n$EndNodes\n$Elements\n2\n1 2 2 1 1 10 20 30\n2 4 2 1 1 10 30 20 40\n$EndElements\n")),
       LengthUnit::mm));
+}
+
+TEST_F(ReadBody, SaysWhatItTurnsAndLeavesOut) {
+  const std::string nodes = "$Nodes\n4\n1 0 0 50\n2 6 0 50\n3 0 6 50\n4 0 0 56\n$EndNodes\n";
+  const auto gmsh = [&](const std::string& name, const std::string& groups, const std::string& element) {
+    return file(name, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" + groups + nodes + "$Elements\n1\n" + element +
+                          "\n$EndElements\n");
+  };
+  EXPECT_THAT(body_remarks(gmsh("plain.msh", "", "1 4 2 1 1 1 2 3 4")), testing::IsEmpty());
+  EXPECT_THAT(body_remarks(gmsh("turned.msh", "", "1 4 2 1 1 1 3 2 4")),
+              testing::ElementsAre(testing::HasSubstr("1 inverted tetrahedra were turned")));
+  EXPECT_THAT(body_remarks(gmsh("curved.msh", "", "1 11 2 1 1 1 2 3 4 1 1 1 1 1 1")),
+              testing::ElementsAre(testing::HasSubstr("of 1 elements of higher order the corners")));
+  EXPECT_THAT(body_remarks(gmsh("groups.msh",
+                                "$PhysicalNames\n3\n2 1 \"skin\"\n3 2 \"liver\"\n3 3 \"a tumour\"\n$EndPhysicalNames\n",
+                                "1 4 2 1 1 1 2 3 4")),
+              testing::ElementsAre(testing::HasSubstr("groups \"liver\", \"a tumour\" are not used")));
 }
 
 TEST_F(ReadBody, ReadsGmsh4) {
