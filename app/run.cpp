@@ -3,43 +3,36 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "app/answer.h"
+#include "app/clear_results.h"
 #include "app/output_folder.h"
 #include "app/progress.h"
 #include "app/recording_check.h"
+#include "app/run_files.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/mesh_files.h"
 #include "palpate/core/stopwatch.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/estimate/force_estimator.h"
 #include "palpate/feedback/map_confidence.h"
 #include "palpate/feedback/map_json.h"
 #include "palpate/feedback/map_preview.h"
-#include "palpate/feedback/overlay.h"
 #include "palpate/feedback/quantile.h"
-#include "palpate/feedback/report.h"
-#include "palpate/feedback/video_writer.h"
 #include "palpate/feedback/warnings.h"
 #include "palpate/instrument/tip_track.h"
+#include "palpate/volume/body_remarks.h"
 
 namespace palpate::app {
 
 namespace {
 
-constexpr int kReportPictures = 6;
 /// Outlines may run along the border of the image, not mostly outside.
 constexpr double kLeastShareInImage = 0.5;
-
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  if (!stream.flush()) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
-}
 
 /// Runs a stage that knows no scene file; what it finds bad is told with the file, and with `key` where its sentence
 /// does not begin with one.
@@ -72,125 +65,6 @@ void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size
       around.tl().x, around.tl().y, around.br().x - 1, around.br().y - 1, size.width, size.height));
 }
 
-/// Of the frame with the greatest force: force over E, and its band.
-Vec3 peak_per_modulus(const std::vector<ForceRow>& rows, const TissueOptions& tissue) {
-  const auto peak = std::max_element(rows.begin(), rows.end(), [](const ForceRow& a, const ForceRow& b) {
-    return a.force_magnitude_N < b.force_magnitude_N;
-  });
-  if (peak == rows.end() || !(peak->force_magnitude_N > 0)) return Vec3::Zero();
-  return Vec3(peak->force_magnitude_N, peak->force_low_N, peak->force_high_N) / tissue.young_modulus_kPa;
-}
-
-std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows = {}) {
-  scene_file.peak_force_per_modulus_N_per_kPa = peak_per_modulus(rows, scene_file.scene.tissue);
-  scene_file.has_run = scene_file.scene.has_tuning = true;
-  scene_file.rectified_from_left = rectification.rectified_from_left;
-  return fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
-}
-
-/// The frames worth a picture in the report: spread over the contact, or over the run where there is none.
-class PictureChoice {
- public:
-  PictureChoice(int frames, std::string unit)
-      : every_(std::max(1, frames / (2 * kReportPictures))), unit_(std::move(unit)) {}
-
-  void offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
-    if (estimate.frame % every_ != 0) return;
-    pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate, unit_)}});
-  }
-
-  std::vector<ReportPicture> chosen() const {
-    std::vector<size_t> order(pictures_.size());
-    for (size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(),
-                     [this](size_t a, size_t b) { return pictures_[a].force_N > pictures_[b].force_N; });
-    order.resize(std::min<size_t>(order.size(), kReportPictures));
-    std::sort(order.begin(), order.end());
-    std::vector<ReportPicture> result;
-    for (size_t i : order) result.push_back(pictures_[i].picture);
-    return result;
-  }
-
- private:
-  static std::string caption(const ForceEstimate& estimate, const std::string& unit) {
-    const std::string force = estimate.in_contact ? fmt::format(", {:.3g} {}", estimate.force_N.norm(), unit) : "";
-    return fmt::format("frame {}, {:.2f} s, {}{}", estimate.frame, estimate.time_s, status_name(estimate.status),
-                       force);
-  }
-
-  struct Offered {
-    double force_N;
-    ReportPicture picture;
-  };
-  int every_;
-  std::string unit_;
-  std::vector<Offered> pictures_;
-};
-
-/// truth_2.csv beside truth.csv, where there is one.
-std::optional<std::filesystem::path> second_truth(const std::filesystem::path& truth) {
-  std::filesystem::path second = truth;
-  second.replace_filename(truth.stem().string() + "_2" + truth.extension().string());
-  if (truth.empty() || !std::filesystem::exists(second)) return {};
-  return second;
-}
-
-/// Everything that grows frame by frame, and the page that is made of it at the end, whatever the end is.
-struct RunFiles {
-  const SceneFile& scene_file;
-  const RunOptions& options;
-  const BuiltMap& built;
-  ForcesWriter forces;
-  SecondForcesWriter forces_2;
-  VideoWriter overlay;
-  OverlayPainter painter;
-  PictureChoice pictures;
-  std::vector<ForceRow> rows;
-  std::vector<FrameTimes> times;
-
-  RunFiles(const SceneFile& s, const RunOptions& o, const BuiltMap& b, const Recording& recording)
-      : scene_file(s),
-        options(o),
-        built(b),
-        forces(o.folder / "forces.csv"),
-        forces_2(o.folder / "forces_2.csv"),
-        overlay(o.folder / "overlay.mp4", recording.fps(), recording.size()),
-        painter(b.rectification, s.scene.tissue, s.overlay),
-        pictures(recording.frame_count(), force_unit(s.scene.tissue)) {}
-
-  void add(const StereoFrame& frame, ForceEstimate estimate) {
-    Stopwatch watch;
-    const cv::Mat picture = painter.paint(frame.left, estimate);
-    estimate.times.draw_ms = watch.lap_ms();
-    for (ForceEstimate& other : estimate.further) other.times = estimate.times;
-    forces.write(estimate);
-    forces_2.write(estimate);
-    overlay.write(picture);
-    pictures.offer(picture, estimate);
-    rows.push_back(to_row(estimate));
-    times.push_back(estimate.times);
-  }
-
-  void close() {
-    overlay.finish();
-    Report report;
-    report.title = std::filesystem::weakly_canonical(options.folder).filename().string();
-    report.rows = rows;
-    report.rows_2 = forces_2.rows();
-    if (!options.truth.empty()) report.truth = read_truth(options.truth);
-    if (const auto truth_2 = second_truth(options.truth); truth_2) report.truth_2 = read_truth(*truth_2);
-    // Frames are matched by number; a truth may count its time from elsewhere, or name none.
-    for (std::vector<ForceRow>* truth : {&report.truth, &report.truth_2})
-      for (ForceRow& row : *truth) row.time_s = row.frame / built.fps;
-    report.times = times;
-    report.tissue = scene_file.scene.tissue;
-    report.settings = run_yaml(scene_file, built.rectification, rows);
-    write_text(options.folder / "run.yaml", report.settings);
-    report.pictures = pictures.chosen();
-    write_report(options.folder / "report.html", report);
-  }
-};
-
 FrameTimes median_stages(const std::vector<FrameTimes>& times, const std::vector<ForceRow>& rows) {
   const bool any_contact = std::any_of(rows.begin(), rows.end(), [](const ForceRow& row) { return row.in_contact; });
   FrameTimes medians;
@@ -206,7 +80,7 @@ FrameTimes median_stages(const std::vector<FrameTimes>& times, const std::vector
 
 RunSummary summary_of(const RunFiles& files, double map_s) {
   RunSummary summary;
-  summary.folder = files.options.folder;
+  summary.folder = files.folder;
   summary.tissue = files.scene_file.scene.tissue;
   summary.frames = static_cast<int>(files.rows.size());
   summary.elements = static_cast<int>(files.built.map.mesh.tetrahedra.size());
@@ -222,11 +96,11 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   }
   summary.peak_force_per_modulus_N_per_kPa = peak_per_modulus(files.rows, summary.tissue);
   summary.frames_by_warning = count_warnings(files.rows);
-  if (!files.options.truth.empty()) summary.comparison = compare(files.rows, read_truth(files.options.truth));
+  if (!files.truths.first.empty()) summary.comparison = compare(files.rows, files.truths.first);
   for (const ForceRow& row : files.forces_2.rows())
     summary.peak_force_2_N = std::max(summary.peak_force_2_N.value_or(0), row.force_magnitude_N);
-  if (const auto truth_2 = second_truth(files.options.truth); truth_2 && summary.peak_force_2_N)
-    summary.comparison_2 = compare(files.forces_2.rows(), read_truth(*truth_2));
+  if (!files.truths.second.empty() && summary.peak_force_2_N)
+    summary.comparison_2 = compare(files.forces_2.rows(), files.truths.second);
   return summary;
 }
 
@@ -279,6 +153,10 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
   built.timing = recording.timing();
   built.notes = recording.notes();
   built.notes.insert(built.notes.end(), rig.notes.begin(), rig.notes.end());
+  if (!scene.map.volume.empty()) {
+    const auto remarks = opened("map.volume", [&] { return body_remarks(scene.map.volume); });
+    built.notes.insert(built.notes.end(), remarks.begin(), remarks.end());
+  }
   if (!quiet) fmt::print(stderr, "{}", describe_input(built.timing, built.notes));
   built.fps = recording.fps();
   built.frame_count = recording.frame_count();
@@ -313,16 +191,21 @@ void write_map_files(const BuiltMap& built, const std::filesystem::path& folder)
   MeshArrays arrays;
   arrays.node_scalars["fixed"].assign(map.mesh.nodes_mm.size(), 0.0);
   for (int node : map.fixed_nodes) arrays.node_scalars["fixed"][static_cast<size_t>(node)] = 1;
-  write_vtu(folder / "map.vtu", map.mesh, arrays);
-  write_ply(folder / "surface.ply", map.surface);
-  write_ply(folder / "cloud.ply", map.cloud);
-  write_text(folder / "map.json", map_json(map, built.rectification));
-  const auto write_picture = [&folder](const std::string& name, const cv::Mat& picture) {
-    if (!cv::imwrite((folder / name).string(), picture))
-      throw Unfinished(fmt::format("{}: cannot be written", (folder / name).string()));
+  Losses losses;
+  losses.attempt([&] { write_vtu(folder / "map.vtu", map.mesh, arrays); });
+  losses.attempt([&] { write_ply(folder / "surface.ply", map.surface); });
+  losses.attempt([&] { write_ply(folder / "cloud.ply", map.cloud); });
+  losses.attempt([&] { write_whole_file(folder / "map.json", map_json(map, built.rectification)); });
+  const auto write_picture = [&](const std::string& name, const cv::Mat& picture) {
+    losses.attempt([&] {
+      std::vector<unsigned char> png;
+      cv::imencode(".png", picture, png);
+      write_whole_file(folder / name, {reinterpret_cast<const char*>(png.data()), png.size()});
+    });
   };
   write_picture("preview.png", draw_map_preview(built.frame.left, built.rectification, map));
   write_picture("confidence.png", draw_map_confidence(built.frame.left, built.rectification, map));
+  if (losses.any()) throw Unfinished(losses.text());
 }
 
 std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
@@ -341,7 +224,7 @@ std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
 
 RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) {
   require_output_folder(options.folder);
-  if (!options.truth.empty()) read_truth(options.truth);
+  Truths truths = read_truths(options.truth);
   Stopwatch watch;
   const BuiltMap built = build_map(scene_file, options.quiet);
   const double map_s = watch.lap_ms() / 1000;
@@ -352,16 +235,10 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
   const Scene& scene = scene_file.scene;
   ForceEstimator estimator = make_estimator(scene_file, built);
   Recording recording(scene.recording);
-  std::filesystem::create_directories(options.folder);
-  write_map_files(built, options.folder);
-  write_text(options.folder / "run.yaml", run_yaml(scene_file, built.rectification));
-  RunFiles files(scene_file, options, built, recording);
-  const auto kept = [&](const std::exception& reason) {
-    files.close();
-    return Unfinished(
-        fmt::format("{}; {} frames are kept in {}", reason.what(), files.rows.size(), options.folder.string()));
-  };
-  try {
+  begin_results(options.folder);
+  RunFiles files(scene_file, options.folder, built, recording, std::move(truths));
+  files.losses.attempt([&] { write_map_files(built, options.folder); });
+  const auto loop = [&] {
     Progress progress("estimate", options.quiet);
     while (auto frame = recording.next()) {
       const ForceEstimate estimate = estimator.update(*frame);
@@ -371,12 +248,16 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
           fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
       if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
     }
-  } catch (const Unfinished& reason) {
-    throw kept(reason);
+  };
+  try {
+    files.losses.attempt(loop);
   } catch (const BadInput& reason) {  // an image in the middle that does not open
-    throw kept(reason);
+    files.losses.add(reason.what());
   }
   files.close();
+  if (files.losses.any())
+    throw Unfinished(
+        fmt::format("{}; {} frames are kept in {}", files.losses.text(), files.rows.size(), options.folder.string()));
   return summary_of(files, map_s);
 }
 

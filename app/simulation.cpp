@@ -1,10 +1,10 @@
 #include "app/simulation.h"
 
-#include <fstream>
-
+#include "app/clear_results.h"
 #include "app/progress.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/simulate/uterus_demo.h"
 
 namespace palpate::app {
@@ -29,6 +29,7 @@ SceneFile demo_scene() {
 
 SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path& folder, bool quiet,
                         DejaVuSummary& summary) {
+  begin_sequence(folder, simulated.file);
   {
     Progress progress("simulate", quiet);
     summary = simulate_dejavu(simulated.simulate, simulated.scene.tissue, simulated.scene.attachments,
@@ -49,10 +50,7 @@ SceneFile simulate_into(const SceneFile& simulated, const std::filesystem::path&
   scene.map.thickness_mm = summary.thickness_mm;
   scene.contact.footprint_radius_mm = summary.contact_radius_mm;
   scene.contact.grip = summary.grip;
-  std::ofstream stream(estimated.file);
-  stream << write_scene_file(estimated);
-  if (!stream.flush()) throw Unfinished(estimated.file.string() + ": cannot be written");
-  stream.close();
+  write_whole_file(estimated.file, write_scene_file(estimated));
   return read_scene_file(estimated.file, true);
 }
 

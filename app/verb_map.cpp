@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
+#include "app/clear_results.h"
 #include "app/output_folder.h"
 #include "app/run.h"
 #include "app/verbs.h"
@@ -28,7 +29,7 @@ void add_map(CLI::App& app) {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
-    std::filesystem::create_directories(arguments->folder);
+    begin_results(arguments->folder);
     write_map_files(built, arguments->folder);
     if (arguments->json) {
       auto json = nlohmann::ordered_json::parse(map_json(built.map, built.rectification));

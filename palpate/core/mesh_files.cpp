@@ -5,36 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 
-#include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
 
 namespace palpate {
 
 namespace {
-
-/// The file gets its final name only when it is complete, so that nobody ever reads half of it.
-void write_whole(const std::filesystem::path& file, const std::string& bytes) {
-  const std::filesystem::path unfinished = file.string() + ".part";
-  std::error_code error;
-  {
-    std::ofstream stream(unfinished, std::ios::binary | std::ios::trunc);
-    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) {
-      std::filesystem::remove(unfinished, error);
-      throw Unfinished(
-          fmt::format("{} cannot be written (no such folder, no permission or a full disk)", file.string()));
-    }
-  }
-  std::filesystem::rename(unfinished, file, error);
-  if (error) {
-    const std::string reason = error.message();
-    std::filesystem::remove(unfinished, error);
-    throw Unfinished(fmt::format("{} cannot be written: {}", file.string(), reason));
-  }
-}
 
 template <class Number>
 void append(std::string& bytes, Number value) {
@@ -126,7 +103,7 @@ void write_vtu(const std::filesystem::path& file, const TetMesh& mesh, const Mes
     text += scalars(name, values);
   }
   text += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
-  write_whole(file, text);
+  write_whole_file(file, text);
 }
 
 void write_ply(const std::filesystem::path& file, const Surface& surface) {
@@ -144,7 +121,7 @@ void write_ply(const std::filesystem::path& file, const Surface& surface) {
     append(bytes, uint8_t{3});
     for (int corner : triangle) append(bytes, static_cast<int32_t>(corner));
   }
-  write_whole(file, bytes);
+  write_whole_file(file, bytes);
 }
 
 void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
@@ -163,7 +140,7 @@ void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
     append(bytes, cloud.depth_deviation_mm[i]);
     append(bytes, cloud.correlation[i]);
   }
-  write_whole(file, bytes);
+  write_whole_file(file, bytes);
 }
 
 }  // namespace palpate

@@ -122,6 +122,7 @@ void ForcesWriter::write(const ForceEstimate& estimate) {
 }
 
 void ForcesWriter::write(const ForceRow& row) {
+  const auto whole_rows_bytes = static_cast<std::uintmax_t>(stream_.tellp());
   stream_ << fmt::format(
       "{},{:.4f},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3e},{:.3f},{:.4f},{},"
       "{:.6f},{:.6f},{:.6f},{:.6f},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
@@ -131,7 +132,12 @@ void ForcesWriter::write(const ForceRow& row) {
       row.force_low_total_N, row.force_high_total_N, row.grip, row.p_contact, row.footprint_mm, row.scene_mm.x(),
       row.scene_mm.y(), row.scene_mm.z());
   stream_.flush();
-  if (!stream_) throw Unfinished(fmt::format("cannot write {}: is the disk full?", file_.string()));
+  if (!stream_) {
+    stream_.close();
+    std::error_code ignored;  // half a row would be read as one
+    std::filesystem::resize_file(file_, whole_rows_bytes, ignored);
+    throw Unfinished(fmt::format("cannot write {}: is the disk full?", file_.string()));
+  }
 }
 
 SecondForcesWriter::SecondForcesWriter(const std::filesystem::path& file) : file_(file) {

@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 
-#include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/compare.h"
 #include "palpate/feedback/quantile.h"
@@ -268,9 +267,7 @@ std::string report_html(const Report& report) {
 }
 
 void write_report(const std::filesystem::path& file, const Report& report) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << report_html(report) << std::flush;
-  if (!stream) throw Unfinished(fmt::format("cannot write {}", file.string()));
+  write_whole_file(file, report_html(report));
 }
 
 }  // namespace palpate

@@ -6,11 +6,12 @@
 
 namespace palpate {
 
-/// Writes an MP4 (H.264, or MPEG-4 where the system has no encoder for it). The file is finished when the writer goes
-/// away, also on the way out of an exception, so that what was written stays readable.
+/// Writes an MP4 (H.264, or MPEG-4 where the system has no encoder for it) of one fragment per frame: what is on the
+/// disk plays, wherever the program ends. Of an odd width or height the last column or row is left out. A mebibyte of
+/// the disk is left free for files that matter more.
 class VideoWriter {
  public:
-  /// Throws Unfinished when no encoder opens the file.
+  /// Throws Unfinished when no encoder opens the file, or the disk is full.
   VideoWriter(const std::filesystem::path& file, double fps, const cv::Size& size);
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;

@@ -1,0 +1,40 @@
+#include "app/clear_results.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "palpate/core/errors.h"
+
+namespace palpate::app {
+
+namespace {
+
+constexpr const char* kResults[] = {"forces.csv", "forces_2.csv", "overlay.mp4", "report.html", "run.yaml",
+                                    "map.vtu",    "surface.ply",  "cloud.ply",   "preview.png", "map.json"};
+constexpr const char* kSequence[] = {"left.mp4",    "right.mp4",        "truth.csv",
+                                     "truth_2.csv", "calibration.yaml", "scene.yaml"};
+
+template <class Names>
+void begin(const std::filesystem::path& folder, const Names& names, const std::filesystem::path& input) {
+  std::error_code error, ignored;
+  std::filesystem::create_directories(folder, error);
+  for (const char* name : names)
+    for (const char* ending : {"", ".part"}) {
+      const std::filesystem::path file = folder / (std::string(name) + ending);
+      if (!error && !std::filesystem::equivalent(file, input, ignored)) std::filesystem::remove(file, error);
+    }
+  if (error) throw Unfinished(fmt::format("{} cannot be made ready for results: {}", folder.string(), error.message()));
+}
+
+}  // namespace
+
+void begin_results(const std::filesystem::path& folder) {
+  begin(folder, kResults, {});
+}
+
+void begin_sequence(const std::filesystem::path& folder, const std::filesystem::path& input) {
+  begin(folder, kSequence, input);
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,119 @@
+#include "app/run_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "palpate/core/stopwatch.h"
+#include "palpate/core/whole_file.h"
+
+namespace palpate::app {
+
+namespace {
+
+constexpr int kReportPictures = 6;
+
+std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows) {
+  scene_file.peak_force_per_modulus_N_per_kPa = peak_per_modulus(rows, scene_file.scene.tissue);
+  scene_file.has_run = scene_file.scene.has_tuning = true;
+  scene_file.rectified_from_left = rectification.rectified_from_left;
+  return fmt::format("# every setting in effect; palpate {}\n{}", PALPATE_VERSION, write_scene_file(scene_file));
+}
+
+std::string caption(const ForceEstimate& estimate, const std::string& unit) {
+  const std::string force = estimate.in_contact ? fmt::format(", {:.3g} {}", estimate.force_N.norm(), unit) : "";
+  return fmt::format("frame {}, {:.2f} s, {}{}", estimate.frame, estimate.time_s, status_name(estimate.status), force);
+}
+
+}  // namespace
+
+std::string Losses::text() const {
+  std::string text;
+  for (const std::string& sentence : sentences_) text += (text.empty() ? "" : "; ") + sentence;
+  return text;
+}
+
+Truths read_truths(const std::filesystem::path& truth) {
+  if (truth.empty()) return {};
+  Truths truths{read_truth(truth), {}};
+  std::filesystem::path second = truth;
+  second.replace_filename(truth.stem().string() + "_2" + truth.extension().string());
+  if (std::filesystem::exists(second)) truths.second = read_truth(second);
+  return truths;
+}
+
+Vec3 peak_per_modulus(const std::vector<ForceRow>& rows, const TissueOptions& tissue) {
+  const auto peak = std::max_element(rows.begin(), rows.end(), [](const ForceRow& a, const ForceRow& b) {
+    return a.force_magnitude_N < b.force_magnitude_N;
+  });
+  if (peak == rows.end() || !(peak->force_magnitude_N > 0)) return Vec3::Zero();
+  return Vec3(peak->force_magnitude_N, peak->force_low_N, peak->force_high_N) / tissue.young_modulus_kPa;
+}
+
+PictureChoice::PictureChoice(int frames, std::string unit)
+    : every_(std::max(1, frames / (2 * kReportPictures))), unit_(std::move(unit)) {}
+
+void PictureChoice::offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
+  if (estimate.frame % every_ != 0) return;
+  pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate, unit_)}});
+}
+
+std::vector<ReportPicture> PictureChoice::chosen() const {
+  std::vector<size_t> order(pictures_.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [this](size_t a, size_t b) { return pictures_[a].force_N > pictures_[b].force_N; });
+  order.resize(std::min<size_t>(order.size(), kReportPictures));
+  std::sort(order.begin(), order.end());
+  std::vector<ReportPicture> result;
+  for (size_t i : order) result.push_back(pictures_[i].picture);
+  return result;
+}
+
+RunFiles::RunFiles(const SceneFile& s, const std::filesystem::path& f, const BuiltMap& b, const Recording& recording,
+                   Truths t)
+    : scene_file(s),
+      folder(f),
+      built(b),
+      truths(std::move(t)),
+      forces(f / "forces.csv"),
+      forces_2(f / "forces_2.csv"),
+      painter(b.rectification, s.scene.tissue, s.overlay),
+      pictures(recording.frame_count(), force_unit(s.scene.tissue)) {
+  losses.attempt([&] { write_whole_file(folder / "run.yaml", run_yaml(scene_file, built.rectification, {})); });
+  losses.attempt([&] { overlay.emplace(folder / "overlay.mp4", recording.fps(), recording.size()); });
+}
+
+void RunFiles::add(const StereoFrame& frame, ForceEstimate estimate) {
+  Stopwatch watch;
+  const cv::Mat picture = painter.paint(frame.left, estimate);
+  estimate.times.draw_ms = watch.lap_ms();
+  for (ForceEstimate& other : estimate.further) other.times = estimate.times;
+  forces.write(estimate);
+  forces_2.write(estimate);
+  if (overlay && !losses.attempt([&] { overlay->write(picture); })) overlay.reset();
+  pictures.offer(picture, estimate);
+  rows.push_back(to_row(estimate));
+  times.push_back(estimate.times);
+}
+
+void RunFiles::close() {
+  if (overlay) losses.attempt([&] { overlay->finish(); });
+  Report report;
+  report.title = std::filesystem::weakly_canonical(folder).filename().string();
+  report.rows = rows;
+  report.rows_2 = forces_2.rows();
+  report.truth = truths.first;
+  report.truth_2 = truths.second;
+  // Frames are matched by number; a truth may count its time from elsewhere, or name none.
+  for (std::vector<ForceRow>* truth : {&report.truth, &report.truth_2})
+    for (ForceRow& row : *truth) row.time_s = row.frame / built.fps;
+  report.times = times;
+  report.tissue = scene_file.scene.tissue;
+  report.settings = run_yaml(scene_file, built.rectification, rows);
+  report.pictures = pictures.chosen();
+  losses.attempt([&] { write_whole_file(folder / "run.yaml", report.settings); });
+  losses.attempt([&] { write_report(folder / "report.html", report); });
+}
+
+}  // namespace palpate::app
