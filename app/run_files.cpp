@@ -89,9 +89,10 @@ void RunFiles::add(const StereoFrame& frame, ForceEstimate estimate) {
   const cv::Mat picture = painter.paint(frame.left, estimate);
   estimate.times.draw_ms = watch.lap_ms();
   for (ForceEstimate& other : estimate.further) other.times = estimate.times;
+  // First the picture: whenever the program dies, each row has its own.
+  if (overlay && !losses.attempt([&] { overlay->write(picture); })) overlay.reset();
   forces.write(estimate);
   forces_2.write(estimate);
-  if (overlay && !losses.attempt([&] { overlay->write(picture); })) overlay.reset();
   pictures.offer(picture, estimate);
   rows.push_back(to_row(estimate));
   times.push_back(estimate.times);

@@ -103,7 +103,7 @@ struct VideoWriter::State {
     stream->time_base = codec->time_base;
     stream->avg_frame_rate = codec->framerate;
     avcodec_parameters_from_context(stream->codecpar, codec.get());
-    av_opt_set(context->priv_data, "movflags", "frag_every_frame+empty_moov+default_base_moof", 0);
+    av_opt_set(context->priv_data, "movflags", "frag_custom+empty_moov+default_base_moof", 0);
     if (avio_open(&context->pb, ("file:" + file.string()).c_str(), AVIO_FLAG_WRITE) < 0) return false;
     has_header = avformat_write_header(context, nullptr) >= 0;
     return has_header;
@@ -119,6 +119,7 @@ struct VideoWriter::State {
       const int written = av_write_frame(output.get(), packet.get());
       av_packet_unref(packet.get());
       check(written);
+      check(av_write_frame(output.get(), nullptr));  // ends the fragment
     }
   }
 
