@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/yaml_tree.h"
 
 namespace palpate::app {
 
@@ -25,6 +26,7 @@ YAML::Node load(const std::filesystem::path& file) {
   try {
     YAML::Node node = YAML::LoadFile(file.string());
     if (!node.IsMap()) throw BadInput(file.string() + ": expected keys and values");
+    require_tree(node);
     return node;
   } catch (const YAML::BadFile&) {
     throw BadInput(file.string() + ": cannot be opened");
@@ -78,11 +80,14 @@ std::optional<double> number_at(const YAML::Node& scene, const std::string& dott
   return YAML::convert<double>::decode(node, number) ? std::optional(number) : std::nullopt;
 }
 
+constexpr int kMostSteps = 1000;
+
 std::vector<double> range_of(const std::filesystem::path& file, const YAML::Node& range, bool logarithmic) {
   const double from = value_of(file, range, "from", NAN), to = value_of(file, range, "to", NAN);
   const int steps = value_of(file, range, "steps", 0);
-  if (!std::isfinite(from) || !std::isfinite(to) || steps < 2 || (logarithmic && (from <= 0 || to <= 0)))
-    fail(file, range, "a range is {from: , to: , steps: at least 2}, positive on a logarithmic axis");
+  if (!std::isfinite(from) || !std::isfinite(to) || steps < 2 || steps > kMostSteps ||
+      (logarithmic && (from <= 0 || to <= 0)))
+    fail(file, range, "a range is {from: , to: , steps: 2 to 1000}, positive on a logarithmic axis");
   std::vector<double> values;
   for (int i = 0; i < steps; ++i) {
     const double t = static_cast<double>(i) / (steps - 1);
@@ -252,8 +257,9 @@ void add_run(const Study& study, const StudyExperiment& experiment, const StudyV
 
 }  // namespace
 
-Study read_study(const std::filesystem::path& file, bool quick) {
-  const YAML::Node node = load(file);
+namespace {
+
+Study study_of(const std::filesystem::path& file, const YAML::Node& node, bool quick) {
   Study study;
   study.file = file;
   study.title = value_of(file, node, "title", file.stem().string());
@@ -276,6 +282,17 @@ Study read_study(const std::filesystem::path& file, bool quick) {
     study.experiments.push_back(experiment);
   }
   return study;
+}
+
+}  // namespace
+
+Study read_study(const std::filesystem::path& file, bool quick) {
+  const YAML::Node node = load(file);
+  try {
+    return study_of(file, node, quick);
+  } catch (const YAML::Exception& error) {  // a list where a word is expected, and the like
+    throw BadInput(fmt::format("{}:{}: {}", file.string(), error.mark.line + 1, error.msg));
+  }
 }
 
 StudyPlan plan_of(const Study& study) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/yaml_tree.h"
 
 namespace palpate {
 
@@ -544,6 +545,7 @@ void read_settings_file(const std::filesystem::path& file, Settings& settings) {
   YAML::Node root;
   try {
     root = YAML::Load(content.str());
+    require_tree(root);
   } catch (const YAML::Exception& error) {
     throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1, shown(error.msg)));
   }

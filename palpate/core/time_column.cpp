@@ -26,8 +26,9 @@ struct Clock {
 
 Clock clock_of(const std::string& text) {
   static const std::regex kTime(R"((?:^|[ T/])(\d{1,2}):(\d{2})(?::(\d{2}))?(?:[.,](\d+))?\s*([aApP][mM])?)");
+  constexpr size_t kLongest = 64;  // no time is longer, and the search would take the stack for what is
   std::smatch found;
-  if (!std::regex_search(text, found, kTime)) return {};
+  if (text.size() > kLongest || !std::regex_search(text, found, kTime)) return {};
   const double first = std::stod(found[1]), second = std::stod(found[2]);
   const double fraction = found[4].length() ? std::stod("0." + found[4].str()) : 0;
   if (!found[3].length()) {

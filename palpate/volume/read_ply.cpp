@@ -38,8 +38,11 @@ class PlyReader {
 
   CellSoup read() {
     read_header();
-    for (const Element& element : elements_)
+    for (const Element& element : elements_) {
+      if (element.properties.empty()) continue;
+      if (element.count > bytes_.left()) throw BadInput("the file is cut short");
       for (size_t i = 0; i < element.count; ++i) read_item(element);
+    }
     return std::move(soup_);
   }
 

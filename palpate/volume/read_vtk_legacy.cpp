@@ -64,6 +64,7 @@ class LegacyReader {
   }
 
   std::vector<double> numbers(size_t count, const std::string& type) {
+    if (count > bytes_.left()) throw BadInput("the file is cut short");
     if (is_binary_) {
       if (size_of_vtk_type(type) == 0) throw BadInput(fmt::format("numbers of type {} are not supported", type));
       return vtk_numbers(bytes_.take(count * size_of_vtk_type(type)), type, true);
@@ -157,7 +158,7 @@ class LegacyReader {
     if (is_binary_) bytes_.line();
     if (types != soup_.types.size()) throw BadInput("as many cell types as cells are expected");
     const std::vector<double> values = numbers(types, "int");
-    for (size_t i = 0; i < types; ++i) soup_.types[i] = static_cast<int>(values[i]);
+    for (size_t i = 0; i < types; ++i) soup_.types[i] = std::abs(values[i]) < 1000 ? static_cast<int>(values[i]) : 0;
   }
 
   MeshBytes bytes_;

@@ -116,7 +116,8 @@ class XmlReader {
         cell.push_back(static_cast<int>(nodes[k]) + before);
       }
       soup_.cells.push_back(std::move(cell));
-      soup_.types.push_back(type_of_all != 0 ? type_of_all : static_cast<int>(types[i]));
+      const bool is_known = type_of_all == 0 && std::abs(types[i]) < 1000;
+      soup_.types.push_back(is_known ? static_cast<int>(types[i]) : type_of_all);
       first = offsets[i];
     }
   }

@@ -19,6 +19,9 @@ namespace {
 /// No organ's mesh has an array of more, and a file that says so is broken.
 constexpr uint64_t kLargestArray_bytes = uint64_t{1} << 31;
 
+/// No data, not even zeros alone, are packed into less.
+constexpr uint64_t kMostPacking = 10000;
+
 uint64_t header_number(MeshBytes& bytes, size_t header_bytes, bool swapped) {
   return header_bytes == 8 ? bytes.binary<uint64_t>(swapped) : bytes.binary<uint32_t>(swapped);
 }
@@ -34,7 +37,7 @@ bool inflate_block(std::string_view packed, const std::string& compressor, char*
     return LZ4_decompress_safe(packed.data(), out, static_cast<int>(packed.size()), static_cast<int>(size)) ==
            static_cast<int>(size);
   if (compressor == "vtkLZMADataCompressor") {
-    uint64_t memory = UINT64_MAX;
+    uint64_t memory = uint64_t{1} << 28;  // four times what its strongest preset asks for
     size_t read = 0, written = 0;
     return lzma_stream_buffer_decode(&memory, 0, nullptr, reinterpret_cast<const uint8_t*>(packed.data()), &read,
                                      packed.size(), reinterpret_cast<uint8_t*>(out), &written, size) == LZMA_OK &&
@@ -87,8 +90,10 @@ std::string unpacked(std::string_view bytes, const std::string& compressor, size
   std::string result;
   for (size_t i = 0; i < packed_sizes.size(); ++i) {
     const size_t size = i + 1 == packed_sizes.size() && last > 0 ? last : block;
+    const std::string_view packed = in.take(packed_sizes[i]);
+    if (size > kMostPacking * packed.size() + 4096) throw BadInput("the header of an array is broken");
     result.resize(result.size() + size);
-    if (!inflate_block(in.take(packed_sizes[i]), compressor, result.data() + result.size() - size, size))
+    if (!inflate_block(packed, compressor, result.data() + result.size() - size, size))
       throw BadInput("compressed data are broken");
   }
   return result;

@@ -185,6 +185,8 @@ TEST(Settings, AFileThatIsNoTextIsNotEchoed) {
   EXPECT_EQ(complaint_about_file(""), "palpate_settings_test.yaml is empty, expected a YAML scene file");
   EXPECT_THAT(complaint_about_file("elements: [1\n"),
               testing::StartsWith("palpate_settings_test.yaml:2: not valid YAML"));
+  EXPECT_THAT(complaint_about_file("elements: &all [1, *all]\n"),
+              testing::HasSubstr("not valid YAML: it is nested too"));
 }
 
 TEST(Settings, AMissingFileAndAFolderAreTold) {
