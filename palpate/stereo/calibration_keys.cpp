@@ -10,6 +10,7 @@
 #include <set>
 
 #include "palpate/core/settings.h"
+#include "palpate/stereo/calibration_names.h"
 
 namespace palpate {
 
@@ -50,161 +51,6 @@ std::vector<std::string> words_of(const std::string& key) {
   }
   end_word();
   return words;
-}
-
-const std::map<std::string, Role>& roles_by_name() {
-  static const std::map<std::string, Role> kRoles = [] {
-    std::map<std::string, Role> roles;
-    const auto add = [&roles](Role role, const std::vector<std::string>& names) {
-      for (const std::string& name : names) roles[name] = role;
-    };
-    add(Role::camera_matrix, {"k",
-                              "m",
-                              "a",
-                              "mtx",
-                              "mat",
-                              "cm",
-                              "camera",
-                              "cameramatrix",
-                              "kk",
-                              "intrinsic",
-                              "intrinsics",
-                              "intrinsicmtx",
-                              "mtxintrinsic",
-                              "intrinsicmatrix",
-                              "intrinsicsmatrix",
-                              "cameramat",
-                              "cammat",
-                              "cammatrix",
-                              "cameramtx",
-                              "cammtx",
-                              "kmatrix",
-                              "matrix",
-                              "cam",
-                              "cameraintrinsics",
-                              "cameraintrinsicmatrix",
-                              "intrinsicparameters",
-                              "newcameramatrix"});
-    add(Role::distortion, {"d",
-                           "dist",
-                           "distortion",
-                           "distcoeffs",
-                           "distcoeff",
-                           "distcoefs",
-                           "distcoef",
-                           "distortioncoefficients",
-                           "distortioncoefficient",
-                           "distortioncoeffs",
-                           "distortioncoeff",
-                           "distortioncoefs",
-                           "distortionvector",
-                           "distortionparameters",
-                           "distortionparams",
-                           "distortioncoefficents",
-                           "kc",
-                           "dc",
-                           "coeffs",
-                           "coefficients",
-                           "distcoefficients",
-                           "cameradistortion",
-                           "distvec",
-                           "distortionparameter",
-                           "dcoeffs"});
-    add(Role::rotation, {"r",
-                         "rot",
-                         "rotation",
-                         "rotationmatrix",
-                         "rotmat",
-                         "rmat",
-                         "om",
-                         "rvec",
-                         "rotationvector",
-                         "stereor",
-                         "rotmatrix",
-                         "rodrigues",
-                         "rotationofcamera",
-                         "extrinsicrotation",
-                         "rstereo",
-                         "rotationlefttoright",
-                         "rlefttoright",
-                         "rl2r",
-                         "rlr",
-                         "extrinsicsr"});
-    add(Role::translation,
-        {"t", "trans", "translation", "translationvector", "transvec", "tvec", "tmat", "translationofcamera", "stereot",
-         "tstereo", "translationmatrix", "extrinsictranslation", "translationlefttoright", "tlefttoright", "tl2r",
-         "tlr", "transmat", "transvector", "extrinsicst"});
-    add(Role::transform, {"tcncnm", "transform", "extrinsic", "extrinsics", "extrinsicmatrix", "extrinsicsmatrix",
-                          "lefttoright", "l2r", "left2right", "stereotransform", "rt", "tlr", "trl", "cameraextrinsic",
-                          "cameraextrinsics", "rightfromleft", "transformation", "transformationmatrix", "posecamera"});
-    add(Role::rectification, {"rect", "rectification", "rectificationmatrix", "rectificationrotation", "rrect"});
-    add(Role::projection, {"p", "proj", "projection", "projectionmatrix", "prect"});
-    add(Role::image_size, {"imagesize", "size", "resolution", "imgsize", "imagesizepx", "imageresolution", "framesize",
-                           "camerasize", "res", "imagedimensions"});
-    add(Role::distortion_model,
-        {"distortionmodel", "distortiontype", "lensmodel", "lens", "cameramodel", "model", "fisheye", "isfisheye",
-         "calibrationmodel", "projectionmodel", "cameratype", "modeltype"});
-    add(Role::focal, {"fc", "f", "focallength", "focal", "focalpx"});
-    add(Role::principal, {"cc", "c", "principalpoint", "opticalcenter", "center", "principal", "pp"});
-    add(Role::radial, {"radialdistortion", "radial"});
-    add(Role::tangential, {"tangentialdistortion", "tangential"});
-    return roles;
-  }();
-  return kRoles;
-}
-
-/// Names of single numbers, as they are called elsewhere and as they are called here.
-const std::map<std::string, std::string>& coefficient_names() {
-  static const std::map<std::string, std::string> kNames = {
-      {"fx", "fx"},
-      {"fcx", "fx"},
-      {"focallengthx", "fx"},
-      {"focalx", "fx"},
-      {"alphax", "fx"},
-      {"fy", "fy"},
-      {"fcy", "fy"},
-      {"focallengthy", "fy"},
-      {"focaly", "fy"},
-      {"alphay", "fy"},
-      {"cx", "cx"},
-      {"ccx", "cx"},
-      {"u0", "cx"},
-      {"ppx", "cx"},
-      {"principalpointx", "cx"},
-      {"x0", "cx"},
-      {"cy", "cy"},
-      {"ccy", "cy"},
-      {"v0", "cy"},
-      {"ppy", "cy"},
-      {"principalpointy", "cy"},
-      {"y0", "cy"},
-      {"f", "f"},
-      {"focal", "f"},
-      {"focallength", "f"},
-      {"focalpx", "f"},
-      {"k1", "k1"},
-      {"k2", "k2"},
-      {"k3", "k3"},
-      {"k4", "k4"},
-      {"k5", "k5"},
-      {"k6", "k6"},
-      {"p1", "p1"},
-      {"p2", "p2"},
-      {"baseline", "baseline"},
-      {"baselinemm", "baseline"},
-      {"baselinem", "baseline"},
-      {"imagewidth", "width"},
-      {"width", "width"},
-      {"resx", "width"},
-      {"imgwidth", "width"},
-      {"w", "width"},
-      {"imageheight", "height"},
-      {"height", "height"},
-      {"resy", "height"},
-      {"imgheight", "height"},
-      {"h", "height"},
-  };
-  return kNames;
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -260,7 +106,8 @@ std::vector<std::string> segments_of(const std::string& path) {
 Role by_size(Role role, const std::string& name, size_t count) {
   const bool says_camera = role == Role::camera_matrix || name.find("intrinsic") != std::string::npos ||
                            name.find("cameramatrix") != std::string::npos;
-  const bool says_pose = role == Role::transform || name.find("extrinsic") != std::string::npos ||
+  const bool is_told = role == Role::rotation || role == Role::translation;
+  const bool says_pose = role == Role::transform || (!is_told && name.find("extrinsic") != std::string::npos) ||
                          name.find("l2r") != std::string::npos || name.find("lefttoright") != std::string::npos;
   if (says_pose)
     return count == 9                   ? Role::rotation
@@ -281,16 +128,24 @@ Role by_size(Role role, const std::string& name, size_t count) {
   if (role == Role::rotation && count == 16) return Role::transform;
   if (role == Role::translation && count == 16) return Role::transform;
   const std::map<Role, std::set<size_t>> counts = {
-      {Role::rotation, {3, 9}}, {Role::translation, {3}}, {Role::rectification, {9}},
-      {Role::projection, {12}}, {Role::image_size, {2}},  {Role::focal, {2}},
-      {Role::principal, {2}},   {Role::radial, {2, 3}},   {Role::tangential, {2}}};
+      {Role::rotation, {3, 9}},    {Role::translation, {3}}, {Role::rectification, {9}}, {Role::projection, {12}},
+      {Role::body_pose, {12, 16}}, {Role::image_size, {2}},  {Role::focal, {2}},         {Role::principal, {2}},
+      {Role::radial, {2, 3}},      {Role::tangential, {2}}};
   if (const auto found = counts.find(role); found != counts.end() && !found->second.count(count)) return Role::none;
   return role;
+}
+
+/// extrinsics[0].T of a list: the pose of the pair, not of its first camera.
+bool is_first_extrinsic(const std::vector<std::string>& segments) {
+  for (size_t i = 1; i < segments.size(); ++i)
+    if (segments[i] == "0" && joined(words_of(segments[i - 1])).starts_with("extrinsic")) return true;
+  return false;
 }
 
 struct Recognised {
   CalibrationValue value;
   Side side;
+  bool may_be_pose = false;  ///< R1: of the first camera in the world where there is a T1, else of cv::stereoRectify
 };
 
 Recognised recognise(const CalibrationEntry& entry) {
@@ -349,10 +204,13 @@ Recognised recognise(const CalibrationEntry& entry) {
     result.value.role = role == Role::distortion ? role : by_size(role, whole, entry.numbers.size());
     // R1 and P1 of cv::stereoRectify; RotationOfCamera2 is the one rotation there is.
     const bool numbered = own.number >= 0 || own.eye != Eye::unknown;
-    if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9)
+    if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9) {
       result.value.role = Role::rectification;
+      result.may_be_pose = true;
+    }
     if (name == "rotationofcamera" || name == "translationofcamera") own = side = {};
     if (result.value.role == Role::transform) own = side = {};
+    if (is_first_extrinsic(segments)) side = {};
   }
   result.side = own.eye != Eye::unknown || own.number >= 0 ? own : side;
   return result;
@@ -367,9 +225,13 @@ std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& en
     found.push_back(recognise(entry));
     from_zero = from_zero || (found.back().side.number == 0 && found.back().value.role != Role::none);
   }
+  const bool has_poses = std::any_of(found.begin(), found.end(), [](const Recognised& one) {
+    return one.value.role == Role::translation && (one.side.eye != Eye::unknown || one.side.number >= 0);
+  });
   std::vector<CalibrationValue> values;
   for (const Recognised& one : found) {
     CalibrationValue value = one.value;
+    if (one.may_be_pose && has_poses) value.role = Role::rotation;
     value.eye = one.side.eye;
     if (value.eye == Eye::unknown && one.side.number >= 0) {
       const int first = from_zero ? 0 : 1;

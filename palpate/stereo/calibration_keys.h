@@ -22,6 +22,7 @@ enum class CalibrationRole {
   rotation,         ///< 3 x 3 or a rotation vector
   translation,      ///< 3
   transform,        ///< 3 x 4 or 4 x 4
+  body_pose,        ///< 4 x 4, from the camera to the body that carries it (EuRoC's T_BS)
   rectification,    ///< 3 x 3
   projection,       ///< 3 x 4
   image_size,       ///< width, height

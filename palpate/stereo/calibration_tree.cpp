@@ -9,11 +9,11 @@
 #include <cmath>
 #include <fstream>
 #include <optional>
-#include <regex>
 #include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/table_text.h"
+#include "palpate/core/yaml_tree.h"
 
 namespace palpate {
 
@@ -73,6 +73,18 @@ std::optional<Numbers> numbers_in(const std::string& text) {
   return result;
 }
 
+/// `Camera-0-F: 1068.2 1068.1  // focal length in pixels`; no address has a blank before its slashes.
+std::string without_remarks(const std::string& text) {
+  std::string result;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    for (size_t at = line.find("//"); at != std::string::npos; at = line.find("//", at + 1))
+      if (at == 0 || line[at - 1] == ' ' || line[at - 1] == '\t') line.erase(at);
+    result += line + "\n";
+  }
+  return result;
+}
+
 Node from_yaml(const YAML::Node& yaml, const std::string& key) {
   Node node{key, "", yaml.IsSequence(), {}};
   if (yaml.IsScalar()) node.text = yaml.Scalar();
@@ -84,6 +96,14 @@ Node from_yaml(const YAML::Node& yaml, const std::string& key) {
   return node;
 }
 
+/// But for what is no calibration: stamp and number of a message.
+bool says_the_same(const Node& a, const Node& b) {
+  if (a.key == "header" && b.key == "header") return true;
+  return a.text == b.text &&
+         std::equal(a.children.begin(), a.children.end(), b.children.begin(), b.children.end(),
+                    [](const Node& x, const Node& y) { return x.key == y.key && says_the_same(x, y); });
+}
+
 /// YAML and JSON. `%YAML:1.0` of FileStorage is no YAML; tabs of JSON are none either.
 Node parse_yaml(const std::string& text) {
   std::string plain;
@@ -92,9 +112,15 @@ Node parse_yaml(const std::string& text) {
     if (!line.starts_with("%YAML")) plain += line + "\n";
   std::replace(plain.begin(), plain.end(), '\t', ' ');
   Node root;
-  for (const YAML::Node& document : YAML::LoadAll(plain))
+  for (const YAML::Node& document : YAML::LoadAll(plain)) {
+    require_tree(document);
     if (document.IsMap() || document.IsSequence())
       root.children.push_back(from_yaml(document, fmt::format("[{}]", root.children.size())));
+  }
+  // `rostopic echo` goes on with the same message under another stamp.
+  std::erase_if(root.children, [&](const Node& document) {
+    return &document != &root.children.front() && says_the_same(root.children.front(), document);
+  });
   if (root.children.size() == 1) {
     Node only = std::move(root.children.front());
     only.key.clear();
@@ -118,7 +144,23 @@ Node from_xml(const boost::property_tree::ptree& tree, const std::string& key) {
   return node;
 }
 
+/// The reader of XML takes the stack for every tag within a tag.
+void require_shallow(const std::string& text) {
+  constexpr int kDeepest = 100;
+  int depth = 0;
+  for (size_t at = text.find('<'); at != std::string::npos && at + 1 < text.size(); at = text.find('<', at + 1)) {
+    const size_t end = text.find('>', at);
+    const bool is_mark = text[at + 1] == '?' || text[at + 1] == '!';
+    if (text[at + 1] == '/')
+      --depth;
+    else if (!is_mark && (end == std::string::npos || text[end - 1] != '/'))
+      ++depth;
+    if (depth > kDeepest) throw boost::property_tree::ptree_error("it is nested too deeply");
+  }
+}
+
 Node parse_xml(const std::string& text) {
+  require_shallow(text);
   boost::property_tree::ptree tree;
   std::istringstream stream(text);
   boost::property_tree::read_xml(stream, tree);
@@ -129,6 +171,49 @@ Node parse_xml(const std::string& text) {
     return only;
   }
   return root;
+}
+
+bool is_letter(char c) {
+  return std::isalpha(static_cast<unsigned char>(c)) != 0;
+}
+
+/// "StereoLeft" of "[StereoLeft]"; empty where the line is none. By hand, as all that follows: the standard library's
+/// regular expressions take the stack for every letter of what they match.
+std::string section_in(const std::string& line) {
+  const bool is_section = line.size() > 2 && line.front() == '[' && line.back() == ']' && is_letter(line[1]) &&
+                          line.find_first_of("=,") == std::string::npos && line.find(']') == line.size() - 1;
+  return is_section ? line.substr(1, line.size() - 2) : "";
+}
+
+/// "fx" and "705" of "fx = 705" or "fx: 705"; empty where the line is none.
+std::pair<std::string, std::string> pair_in(const std::string& line) {
+  const size_t cut = line.find_first_of("=:");
+  if (cut == std::string::npos || !is_letter(line[0])) return {};
+  const std::string key(trimmed(std::string_view(line).substr(0, cut)));
+  const bool is_name = std::all_of(key.begin(), key.end(), [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == ' ' || c == '.' || c == '-';
+  });
+  if (!is_name) return {};
+  return {key, std::string(trimmed(std::string_view(line).substr(cut + 1)))};
+}
+
+/// The first line that is no remark is a [section].
+bool begins_with_section(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    line = std::string(trimmed(line));
+    if (line.empty() || line.front() == ';' || line.front() == '#') continue;
+    return !section_in(line).empty();
+  }
+  return false;
+}
+
+/// Where the number begins in "kc_0"; npos where there is none.
+size_t number_at_end(const std::string& key) {
+  const size_t digits = key.find_last_not_of("0123456789");
+  const bool is_numbered = digits != std::string::npos && digits > 0 && digits + 1 < key.size() && key[digits] == '_' &&
+                           is_letter(key[digits - 1]);
+  return is_numbered ? digits + 1 : std::string::npos;
 }
 
 /// `[section]`, `key = value`, `key: value`, and rows of numbers below a word that names them, or below none.
@@ -143,7 +228,6 @@ Node parse_text(const std::string& text, const std::string& name) {
     group->children.push_back({key, "", false, {}});
     return group->children.back();
   };
-  static const std::regex kSection(R"(\[([A-Za-z][^\]=,]*)\])"), kPair(R"(([A-Za-z][\w .\-]*?)\s*[=:]\s*(.*))");
   std::string section, heading = name;
   Node* rows = nullptr;
   size_t row_length = 0;
@@ -151,17 +235,16 @@ Node parse_text(const std::string& text, const std::string& name) {
   for (std::string line; std::getline(lines, line);) {
     line = std::string(trimmed(line));
     if (line.empty() || line.starts_with("//") || line.starts_with('#') || line.starts_with(';')) continue;
-    std::smatch found;
     if (const auto numbers = numbers_in(line)) {
       const bool continues = rows && numbers->values.size() == row_length && row_length > 1;
       if (!continues) rows = &add(section, heading);
       rows->text += (continues ? "; " : "") + line;
       row_length = numbers->values.size();
-    } else if (std::regex_match(line, found, kSection)) {
-      section = found[1];
+    } else if (const std::string name_of_section = section_in(line); !name_of_section.empty()) {
+      section = name_of_section;
       rows = nullptr;
-    } else if (std::regex_match(line, found, kPair) && found[2].length() > 0) {
-      add(section, found[1]).text = found[2];
+    } else if (const auto [key, value] = pair_in(line); !value.empty()) {
+      add(section, key).text = value;
       rows = nullptr;
     } else {
       heading = line.substr(0, line.find_last_not_of(":= ") + 1);
@@ -173,18 +256,17 @@ Node parse_text(const std::string& text, const std::string& name) {
 
 /// Scalars called R_0, R_1, ... are one value R.
 void gather_numbered(Node& node) {
-  static const std::regex kNumbered("(.*[A-Za-z])_([0-9]+)");
   std::vector<Node> kept;
   for (Node& child : node.children) {
-    std::smatch found;
+    const size_t number = number_at_end(child.key);
     const bool is_scalar =
         child.children.empty() && numbers_in(child.text) && numbers_in(child.text)->values.size() == 1;
-    if (!is_scalar || !std::regex_match(child.key, found, kNumbered)) {
+    if (!is_scalar || number == std::string::npos) {
       kept.push_back(std::move(child));
       continue;
     }
-    const std::string stem = found[1];
-    const size_t index = std::stoul(found[2].str().substr(0, 4));
+    const std::string stem = child.key.substr(0, number - 1);
+    const auto index = static_cast<size_t>(number_of(std::string_view(child.key).substr(number, 4)));
     auto place = std::find_if(kept.begin(), kept.end(), [&](const Node& n) { return n.key == stem && n.is_list; });
     if (place == kept.end()) place = kept.insert(kept.end(), Node{stem, "", true, {}});
     if (place->children.size() == index) place->children.push_back({fmt::format("[{}]", index), child.text, false, {}});
@@ -224,7 +306,8 @@ void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>&
     if (const auto numbers = numbers_of_node(*data)) {
       const Node* rows = node.child("rows");
       const auto stated = rows ? numbers_in(rows->text) : std::nullopt;
-      return add(*numbers, stated && stated->values[0] < 1e6 ? static_cast<int>(stated->values[0]) : 0);
+      return add(*numbers,
+                 stated && stated->values[0] > 0 && stated->values[0] < 1e6 ? static_cast<int>(stated->values[0]) : 0);
     }
   }
   if (const auto numbers = numbers_of_node(node)) return add(*numbers, numbers->rows);
@@ -279,14 +362,15 @@ std::vector<CalibrationEntry> read_calibration_tree(const std::filesystem::path&
   std::string text = as_utf8(content);
   text.erase(std::remove(text.begin(), text.end(), '\r'), text.end());
   const size_t begin = text.find_first_not_of(" \t\n");
-  static const std::regex kFirstLineOfIni(R"((\s*[;#][^\n]*\n)*\s*\[[A-Za-z][^\]=,\n]*\][ \t]*\n[\s\S]*)");
+  const bool is_xml = begin != std::string::npos && text[begin] == '<';
+  if (!is_xml) text = without_remarks(text);
   const std::string head = text.substr(0, 4096);
   Node root;
   std::string why;
   try {
-    if (begin != std::string::npos && text[begin] == '<')
+    if (is_xml)
       root = parse_xml(text);
-    else if (!std::regex_match(head, kFirstLineOfIni))
+    else if (!begins_with_section(text))
       root = parse_yaml(text);
   } catch (const YAML::Exception& error) {
     why = error.what();

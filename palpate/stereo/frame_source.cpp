@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/stereo/times_file.h"
 
 namespace palpate {
 namespace {
@@ -48,14 +49,12 @@ class ImageFiles : public FrameSource {
  public:
   ImageFiles(std::vector<NumberedFile> files, const std::string& key, double fps)
       : files_(std::move(files)), key_(key), fps_(fps) {
-    const double unit = seconds_per_number(files_, fps);
-    counts_frames_ = unit == 1 / (fps > 0 ? fps : kUsualFps);
-    // Stamps since 1970 are too long for a double to add up; they are counted from a whole second near the first.
-    const long long origin =
-        counts_frames_ ? 0 : files_.front().number / std::llround(1 / unit) * std::llround(1 / unit);
-    const double origin_s = static_cast<double>(origin) * unit;
-    for (const NumberedFile& file : files_)
-      stamps_s_.push_back(origin_s + static_cast<double>(file.number - origin) * unit);
+    if (fps_ <= 0 && files_.size() > 1) {
+      ImageTimes beside = times_beside(files_);
+      stamps_s_ = std::move(beside.times_s);
+      note_ = std::move(beside.note);
+    }
+    counts_frames_ = stamps_s_.empty() && take_stamps_of_names();
     size_ = load(files_.front().file).size();
   }
   std::optional<Frame> next() override {
@@ -72,8 +71,21 @@ class ImageFiles : public FrameSource {
   std::string clock() const override { return counts_frames_ ? "numbers" : "stamps"; }
   const std::vector<double>& stamps_s() const override { return stamps_s_; }
   double stated_fps() const override { return counts_frames_ ? (fps_ > 0 ? fps_ : kUsualFps) : 0; }
+  std::string note() const override { return note_; }
 
  private:
+  /// Whether the names only count.
+  bool take_stamps_of_names() {
+    const double unit = seconds_per_number(files_, fps_);
+    const bool counts = unit == 1 / (fps_ > 0 ? fps_ : kUsualFps);
+    // Stamps since 1970 are too long for a double to add up; they are counted from a whole second near the first.
+    const long long origin = counts ? 0 : files_.front().number / std::llround(1 / unit) * std::llround(1 / unit);
+    const double origin_s = static_cast<double>(origin) * unit;
+    for (const NumberedFile& file : files_)
+      stamps_s_.push_back(origin_s + static_cast<double>(file.number - origin) * unit);
+    return counts;
+  }
+
   cv::Mat load(const std::filesystem::path& file) {
     const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
     if (image.empty()) throw BadInput(fmt::format("{}: {} is not an image that opens", key_, file.string()));
@@ -99,6 +111,7 @@ class ImageFiles : public FrameSource {
   double fps_;
   bool counts_frames_ = true;
   std::vector<double> stamps_s_;
+  std::string note_;
   cv::Size size_;
   double white_ = 0;
   size_t next_ = 0;
@@ -107,7 +120,12 @@ class ImageFiles : public FrameSource {
 /// What comes in while it is read: device, GStreamer pipeline, address.
 class LiveSource : public FrameSource {
  public:
-  LiveSource(const cv::VideoCapture& capture, const std::string& name, const std::string& key) : capture_(capture) {
+  /// A camera does not end by itself; a pipeline may, and what is behind an address where its length is known.
+  LiveSource(const cv::VideoCapture& capture, const std::string& name, const std::string& key, bool is_pipeline)
+      : capture_(capture),
+        name_(name),
+        key_(key),
+        never_ends_(!is_pipeline && !(capture.get(cv::CAP_PROP_FRAME_COUNT) > 0)) {
     if (!capture_.read(first_) || first_.empty())
       throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, name));
     size_ = first_.size();
@@ -119,8 +137,9 @@ class LiveSource : public FrameSource {
       first_.release();
       return frame;
     }
-    if (!capture_.read(frame.image) || frame.image.empty()) return std::nullopt;
-    return frame;
+    if (capture_.read(frame.image) && !frame.image.empty()) return frame;
+    if (never_ends_) throw Unfinished(fmt::format("{}: {} gives no more pictures", key_, name_));
+    return std::nullopt;
   }
   cv::Size size() const override { return size_; }
   std::string clock() const override { return "live"; }
@@ -132,6 +151,8 @@ class LiveSource : public FrameSource {
 
  private:
   cv::VideoCapture capture_;
+  std::string name_, key_;
+  bool never_ends_;
   cv::Mat first_;
   cv::Size size_;
   std::vector<double> none_;
@@ -155,7 +176,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path
                                  is_device     ? "camera device"
                                  : is_pipeline ? "GStreamer pipeline"
                                                : "video"));
-    return std::make_unique<LiveSource>(capture, name, key);
+    return std::make_unique<LiveSource>(capture, name, key, is_pipeline);
   }
   std::error_code ignored;
   if (has_placeholder(path) && !std::filesystem::exists(path, ignored)) {

@@ -31,10 +31,12 @@ class FrameSource {
   virtual int frames_if_whole() const { return 0; }
   /// Its pictures are made of two moments, in every second row.
   virtual bool is_interlaced() const { return false; }
+  /// A sentence on how it was read that a user ought to know.
+  virtual std::string note() const { return {}; }
 };
 
-/// `key` names the source in sentences: "recording.left". `fps` numbers images whose names hold no time; 0 = as usual.
-/// Throws BadInput: missing, empty, not to be opened.
+/// `key` names the source in sentences: "recording.left". `fps` numbers images whose times are not told by their names
+/// or a file beside them; 0 = as usual. Throws BadInput: missing, empty, not to be opened.
 std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps);
 
 /// A video file by FFmpeg: edit lists, empty chunks and a start other than zero are in the stamps.

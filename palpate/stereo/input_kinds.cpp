@@ -23,6 +23,15 @@ const std::vector<CalibrationKind>& registry() {
       {{"StereoMIS calibration", "StereoMIS (`StereoCalibration.ini`)",
         "fc_x, cc_x, kc_0 ..., R_0 ..., T_0 ... of StereoLeft and StereoRight"},
        {"stereoleft", "stereoright"}},
+      {{"EndoVis text file", "EndoVis challenges (`camera_calibration.txt`)",
+        "Camera-0-F, Camera-0-C, Camera-0-K ..., Extrinsic-Omega (a rotation vector), Extrinsic-T; remarks behind //"},
+       {"extrinsic-omega"}},
+      {{"camcal.json", "da Vinci recordings (StereoMIS and others)",
+        "data.intrinsics of both cameras (f, c, k), data.extrinsics (om, T)"},
+       {"extrinsics.om", "extrinsics[0].om"}},
+      {{"EuRoC sensor.yaml", "EuRoC, and whoever writes its layout",
+        "cam0/sensor.yaml is named, cam1/sensor.yaml stands beside it; intrinsics, distortion_coefficients, T_BS"},
+       {"t_bs"}},
       {{"Hamlyn text files", "Hamlyn Centre (a folder of text files with bare numbers)",
         "files of one folder, called by left, right, intrinsic, distortion, extrinsic or l2r"},
        {"l2r", "_txt"}},
@@ -79,9 +88,9 @@ std::vector<InputKind> recording_kinds() {
        "has "
        "none"},
       {"numbered images", "KITTI, Hamlyn, SCARED, EuRoC, Blender",
-       "`left_%04d.png`, `image01/%010d.jpg`, `%04d/left.png`; gaps are gaps; numbers that are ns, us or ms since 1970 "
-       "are "
-       "stamps; 8, 10, 12 or 16 bits; a name that is there as it stands is a file"},
+       "`left_%04d.png`, `image01/%010d.jpg`, `%04d/left.png`; gaps are gaps; times from times.txt, timestamps.txt or "
+       "data.csv beside the images or one folder above; numbers that are ns, us or ms since 1970 are stamps; 8, 10, 12 "
+       "or 16 bits; a name that is there as it stands is a file"},
       {"both cameras in one picture", "da Vinci, 3D recorders", "`stereo` with `layout: side-by-side` or `top-bottom`"},
       {"interlaced pictures", "3D recorders, HD-SDI", "said; `deinterlace: true` keeps the even rows"},
       {"live", "V4L2, GStreamer, RTSP", "device number, pipeline or address, as OpenCV opens them; times are counted"},

@@ -1,19 +1,15 @@
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <optional>
 
 #include "palpate/core/errors.h"
-#include "palpate/stereo/calibration_keys.h"
-#include "palpate/stereo/calibration_tree.h"
+#include "palpate/stereo/calibration_files.h"
 #include "palpate/stereo/check_rig.h"
 #include "palpate/stereo/input_kinds.h"
 #include "palpate/stereo/rig.h"
@@ -26,83 +22,6 @@ using Eye = CalibrationEye;
 using Numbers = std::vector<double>;
 
 constexpr double kMostBaseline_mm = 200;
-
-/// What a file says of one camera, or, of Eye::unknown, of the pair or of the only camera in it.
-struct Said {
-  std::map<Role, Numbers> values;
-  std::map<std::string, double> coefficients;
-  std::string model;
-
-  const Numbers* find(Role role) const {
-    const auto found = values.find(role);
-    return found == values.end() ? nullptr : &found->second;
-  }
-  double coefficient(const std::string& name, double otherwise = 0) const {
-    const auto found = coefficients.find(name);
-    return found == coefficients.end() ? otherwise : found->second;
-  }
-};
-
-struct Calibration {
-  std::filesystem::path file;
-  std::vector<CalibrationEntry> entries;
-  std::array<Said, 3> said;  // by Eye
-  bool by_matlab = false;
-
-  Said& of(Eye eye) { return said[static_cast<size_t>(eye)]; }
-  const Said& of(Eye eye) const { return said[static_cast<size_t>(eye)]; }
-};
-
-[[noreturn]] void refuse(const Calibration& calibration, const std::string& why) {
-  throw BadInput(fmt::format("{}: {}; {}", calibration.file.string(), why, keys_there(calibration.entries)));
-}
-
-std::string small(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-void sort_in(Calibration& calibration) {
-  for (const CalibrationValue& value : recognised(calibration.entries)) {
-    const CalibrationEntry& entry = *value.entry;
-    if (value.role != Role::none &&
-        !std::all_of(entry.numbers.begin(), entry.numbers.end(), [](double number) { return std::isfinite(number); }))
-      throw BadInput(fmt::format("{}: {} is [{:.6g}], expected finite numbers", calibration.file.string(), entry.path,
-                                 fmt::join(entry.numbers, ", ")));
-    calibration.by_matlab = calibration.by_matlab || small(entry.path).find("cameraparameters") != std::string::npos;
-    Said& said = calibration.of(value.eye);
-    if (value.role == Role::coefficient) {
-      said.coefficients.emplace(value.name, entry.numbers.front());
-    } else if (value.role == Role::distortion_model) {
-      const bool is_flag = small(entry.path).find("fisheye") != std::string::npos;
-      const bool is_set = entry.text == "true" || (!entry.numbers.empty() && entry.numbers.front() != 0);
-      if (is_flag && is_set) said.model += " fisheye";
-      if (!is_flag) said.model += " " + small(entry.text);
-    } else if (value.role != Role::none) {
-      said.values.emplace(value.role, entry.numbers);
-    }
-  }
-}
-
-Calibration calibration_of(const std::filesystem::path& file) {
-  Calibration calibration{file, read_calibration_tree(file), {}, false};
-  sort_in(calibration);
-  return calibration;
-}
-
-bool has_camera(const Said& said) {
-  return said.find(Role::camera_matrix) || said.find(Role::intrinsics) || said.find(Role::projection) ||
-         said.find(Role::focal) || said.coefficients.count("fx");
-}
-bool has_pose(const Calibration& calibration) {
-  for (const Eye eye : {Eye::unknown, Eye::right})
-    for (const Role role : {Role::translation, Role::transform})
-      if (calibration.of(eye).find(role)) return true;
-  return calibration.of(Eye::unknown).coefficients.count("baseline") > 0;
-}
-bool both_projected(const Calibration& calibration) {
-  return calibration.of(Eye::left).find(Role::projection) && calibration.of(Eye::right).find(Role::projection);
-}
 
 /// The camera matrix, wherever its numbers stand.
 std::optional<cv::Matx33d> camera_matrix_of(const Said& eye, const Said& both) {
@@ -164,7 +83,7 @@ LensModel lens_of(const Calibration& calibration, const Said& said, const Number
                          eye, model, D.size()));
     return LensModel::fisheye;
   }
-  if (D.size() != 4 || says({"plumb", "radtan", "rational", "brown", "radial"})) return LensModel::brown;
+  if (D.size() != 4 || says({"plumb", "radtan", "rational", "brown", "radial", "opencv"})) return LensModel::brown;
   const double tangential = std::max(std::abs(D[2]), std::abs(D[3]));
   if (tangential > kLargestTangential) return LensModel::fisheye;
   if (tangential <= kUsualTangential) return LensModel::brown;
@@ -242,14 +161,26 @@ Pose pose_of_projections(const Said& left, const Said& right) {
   return {right_turned.transpose() * left_turned, right_turned.transpose() * Vec3(shift(right) - shift(left), 0, 0)};
 }
 
+/// Of the first three rows of a 4 x 4 matrix.
+Pose pose_from(const Numbers& m) {
+  Pose pose;
+  pose.rotation << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  pose.translation = {m[3], m[7], m[11]};
+  return pose;
+}
+
+/// Both cameras in the axes of the body that carries them.
+Pose pose_of_bodies(const Said& left, const Said& right) {
+  const Pose body_from_left = pose_from(*left.find(Role::body_pose)),
+             body_from_right = pose_from(*right.find(Role::body_pose));
+  const Mat3 right_from_body = body_from_right.rotation.transpose();
+  return {right_from_body * body_from_left.rotation,
+          right_from_body * (body_from_left.translation - body_from_right.translation)};
+}
+
 std::optional<Pose> world_pose(const Said& said) {
   Pose pose;
-  if (const Numbers* M = said.find(Role::transform)) {
-    const auto& m = *M;
-    pose.rotation << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
-    pose.translation = {m[3], m[7], m[11]};
-    return pose;
-  }
+  if (const Numbers* M = said.find(Role::transform)) return pose_from(*M);
   const Numbers *R = said.find(Role::rotation), *T = said.find(Role::translation);
   if (!T) return std::nullopt;
   if (R) pose.rotation = rotation_from(*R);
@@ -271,7 +202,8 @@ Pose pose_of(const Calibration& calibration) {
     const Mat3 rotation = of_right->rotation * of_left->rotation.transpose();
     return {rotation, of_right->translation - rotation * of_left->translation};
   }
-  if (both_projected(calibration)) return pose_of_projections(left, right);
+  if (both_have(calibration, Role::body_pose)) return pose_of_bodies(left, right);
+  if (both_have(calibration, Role::projection)) return pose_of_projections(left, right);
   if (both.coefficients.count("baseline"))
     return {Mat3::Identity(), Vec3(-std::abs(both.coefficient("baseline")), 0, 0)};
   refuse(calibration, "no pose of the cameras to each other, expected R and T (x_right = R x_left + T)");
@@ -284,24 +216,10 @@ double to_mm(TranslationUnit unit, double length) {
   return length <= kMostBaseline_mm / 1000 ? 1000 : 1;
 }
 
-cv::Size size_of(const Calibration& calibration) {
-  for (const Eye eye : {Eye::unknown, Eye::left}) {
-    const Said& said = calibration.of(eye);
-    const double width = said.coefficient("width"), height = said.coefficient("height");
-    if (width > 0 && height > 0 && width < 1e5 && height < 1e5) return cv::Size(cvRound(width), cvRound(height));
-    if (const Numbers* size = said.find(Role::image_size);
-        size && (*size)[0] > 0 && (*size)[0] < 1e5 && (*size)[1] < 1e5) {
-      const cv::Size stated(cvRound((*size)[0]), cvRound((*size)[1]));
-      return calibration.by_matlab ? cv::Size(stated.height, stated.width) : stated;
-    }
-  }
-  return {};
-}
-
 StereoRig rig_of(const Calibration& calibration, TranslationUnit unit) {
   StereoRig rig;
   rig.file = calibration.file;
-  rig.image_size = size_of(calibration);
+  rig.image_size = image_size_of(calibration);
   rig.left = camera_of(calibration, Eye::left, rig);
   rig.right = camera_of(calibration, Eye::right, rig);
   Pose pose = pose_of(calibration);
@@ -313,100 +231,6 @@ StereoRig rig_of(const Calibration& calibration, TranslationUnit unit) {
   rig.right_from_left_mm = pose.translation * to_mm(unit, pose.translation.norm());
   rig.notes.insert(rig.notes.begin(), "read as " + calibration_kind(calibration.entries));
   return rig;
-}
-
-/// The same name with one word exchanged for another, in the same capitals; nothing where the word is not in it or no
-/// such file is there.
-std::optional<std::filesystem::path> beside(const std::filesystem::path& file, const std::string& word,
-                                            const std::string& other) {
-  const std::string name = file.filename().string();
-  const size_t at = small(name).rfind(word);
-  if (at == std::string::npos) return std::nullopt;
-  std::string spelled = other;
-  if (std::isupper(static_cast<unsigned char>(name[at]))) spelled[0] = static_cast<char>(std::toupper(spelled[0]));
-  if (word.size() > 1 && std::isupper(static_cast<unsigned char>(name[at + 1])))
-    std::transform(spelled.begin(), spelled.end(), spelled.begin(), [](unsigned char c) { return std::toupper(c); });
-  return file.parent_path() / (name.substr(0, at) + spelled + name.substr(at + word.size()));
-}
-
-std::optional<std::filesystem::path> first_there(const std::filesystem::path& file,
-                                                 const std::vector<std::pair<std::string, std::string>>& exchanges) {
-  std::error_code ignored;
-  for (const auto& [word, other] : exchanges)
-    if (const auto path = beside(file, word, other); path && std::filesystem::exists(*path, ignored)) return path;
-  return std::nullopt;
-}
-
-/// Of what one file lacks, the other one gives.
-void add_what_is_missing(Calibration& calibration, const Calibration& other) {
-  for (size_t eye = 0; eye < calibration.said.size(); ++eye) {
-    calibration.said[eye].values.insert(other.said[eye].values.begin(), other.said[eye].values.end());
-    calibration.said[eye].coefficients.insert(other.said[eye].coefficients.begin(), other.said[eye].coefficients.end());
-  }
-}
-
-/// Calibrations come in pieces: intrinsics.yml and extrinsics.yml, left.yaml and right.yaml, a folder of text files.
-Calibration whole_calibration(const std::filesystem::path& file) {
-  Calibration calibration = calibration_of(file);
-  if (is_bare_numbers(file)) {
-    std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), ignored)) {
-      if (!is_bare_numbers(entry.path()) || entry.path() == file) continue;
-      const auto more = read_calibration_tree(entry.path());
-      calibration.entries.insert(calibration.entries.end(), more.begin(), more.end());
-    }
-    calibration.said = {};
-    sort_in(calibration);
-    return calibration;
-  }
-  const bool has_left = has_camera(calibration.of(Eye::left)), has_right = has_camera(calibration.of(Eye::right));
-  const bool only_camera = !has_left && !has_right && has_camera(calibration.of(Eye::unknown)) &&
-                           !calibration.of(Eye::unknown).coefficients.count("baseline");
-  if (only_camera) {
-    const std::vector<std::pair<std::string, std::string>> names = {
-        {"left", "right"}, {"cam0", "cam1"}, {"camera0", "camera1"}, {"_l", "_r"}, {"_0", "_1"}, {"cam1", "cam2"}};
-    auto right = first_there(file, names);
-    if (!right) right = beside(file, "left", "right");
-    if (!right)
-      throw BadInput(
-          fmt::format("{}: it holds one camera only; of a pair of files the left one is named, expected "
-                      "\"left\" in the name so that the right one can be found beside it",
-                      file.string()));
-    Calibration other = calibration_of(*right);
-    calibration.of(Eye::left) = calibration.of(Eye::unknown);
-    calibration.of(Eye::right) = other.of(Eye::unknown);
-    calibration.of(Eye::unknown) = {};
-    const cv::Size size = size_of(calibration);
-    other.of(Eye::left) = other.of(Eye::unknown);
-    if (size_of(other) != size)
-      throw BadInput(fmt::format("{} is for {}x{} px but {} for {}x{} px, expected the same size", file.string(),
-                                 size.width, size.height, right->string(), size_of(other).width,
-                                 size_of(other).height));
-    if (!both_projected(calibration))
-      throw BadInput(
-          fmt::format("{} and {}: no projection_matrix (P) in both of them, which holds the distance of the "
-                      "cameras",
-                      file.string(), right->string()));
-  } else if ((has_left || has_right) && !has_pose(calibration) && !both_projected(calibration)) {
-    const auto extrinsics =
-        first_there(file, {{"intrinsics", "extrinsics"}, {"intrinsic", "extrinsic"}, {"int", "ext"}});
-    if (!extrinsics)
-      refuse(calibration,
-             "R and T are missing, and no extrinsics file stands beside it (the same name with extrinsics for "
-             "intrinsics); expected all of a stereo calibration, M1 D1 M2 D2 R T");
-    add_what_is_missing(calibration, calibration_of(*extrinsics));
-  } else if (!has_camera(calibration.of(Eye::left)) || !has_camera(calibration.of(Eye::right)) ||
-             !calibration.of(Eye::left).find(Role::camera_matrix)) {
-    if (const auto intrinsics =
-            first_there(file, {{"extrinsics", "intrinsics"}, {"extrinsic", "intrinsic"}, {"ext", "int"}}))
-      if (has_pose(calibration)) {
-        Calibration cameras = calibration_of(*intrinsics);
-        cameras.file = calibration.file;
-        add_what_is_missing(cameras, calibration);
-        return cameras;
-      }
-  }
-  return calibration;
 }
 
 }  // namespace

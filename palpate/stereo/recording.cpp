@@ -206,6 +206,7 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   s.fps = options.fps > 0 ? options.fps : mean_fps(*s.first, s.pairing.timing);
   if (!(s.fps > 0)) s.fps = kFallbackFps;
   s.notes = notes_of(s.pairing.timing, held, s.pairing.right_shift_s);
+  if (!s.first->note().empty()) s.notes.push_back(s.first->note());
   if (s.first->is_interlaced() && !options.deinterlace)
     s.notes.push_back("the pictures are interlaced, every second row is of another moment: set recording.deinterlace");
 }

@@ -122,6 +122,7 @@ class VideoFile : public FrameSource {
   /// Also where the pictures end before the packets do.
   int frames_if_whole() const override {
     if (frames_if_whole_ > 0) return frames_if_whole_;
+    if (is_broken_off_) return static_cast<int>(stamps_s_.size());
     const bool stopped = stamps_s_.size() > 2 && last_stamp_s_ < *(stamps_s_.end() - 3);
     return stopped ? static_cast<int>(stamps_s_.size()) : 0;
   }
@@ -189,12 +190,14 @@ class VideoFile : public FrameSource {
         return frame;
       }
       if (received != AVERROR(EAGAIN)) return std::nullopt;
-      if (av_read_frame(input_.get(), packet_.get()) < 0) {
+      if (const int read = av_read_frame(input_.get(), packet_.get()); read < 0) {
+        is_broken_off_ = read != AVERROR_EOF;
         avcodec_send_packet(codec_.get(), nullptr);
         continue;
       }
       // What cannot be decoded is left out: the stamps of the others stand.
-      if (packet_->stream_index == stream_ && packet_->size > 0) avcodec_send_packet(codec_.get(), packet_.get());
+      const bool is_whole = packet_->size > 0 && !(packet_->flags & AV_PKT_FLAG_CORRUPT);
+      if (packet_->stream_index == stream_ && is_whole) avcodec_send_packet(codec_.get(), packet_.get());
       av_packet_unref(packet_.get());
     }
   }
@@ -239,6 +242,7 @@ class VideoFile : public FrameSource {
   std::string key_;
   std::vector<double> stamps_s_;
   int frames_if_whole_ = 0;
+  bool is_broken_off_ = false;  ///< the medium failed while it was read
   Packet packet_;
   Picture picture_;
   Input input_;

@@ -211,6 +211,60 @@ TEST_F(CalibrationFile, MayBeThatOfAnEndoscopicDataSet) {
   expect_the_pair("calib.left.intrinsic.txt", text(kK1, 3));
 }
 
+TEST_F(CalibrationFile, MayBeThatOfAChallengeWithRemarks) {
+  cv::Vec3d omega;
+  cv::Rodrigues(cv::Matx33d(kR().data()), omega);
+  const auto camera = [](int number, const Numbers& K, const Numbers& D) {
+    return fmt::format(
+        "Camera-{0}-F: {1} {2}        // x,y focal length in pixels\nCamera-{0}-C: {3} {4} // center: in pixels\n"
+        "Camera-{0}-Alpha: 0.0\nCamera-{0}-K: {5:.12g}  // distortion\n",
+        number, K[0], K[4], K[2], K[5], fmt::join(D, " "));
+  };
+  expect_the_pair(
+      "camera_calibration.txt",
+      fmt::format("// made by a program\nWidth: 640 // px\nHeight: 480\n{}{}Extrinsic-Omega: {:.14g} {:.14g} "
+                  "{:.14g} // rotation\nExtrinsic-T: {:.12g}\n",
+                  camera(0, kK1, kD1), camera(1, kK2, kD2), omega[0], omega[1], omega[2], fmt::join(kT, " ")));
+}
+
+TEST_F(CalibrationFile, MayBeThatOfARobotsRecorder) {
+  cv::Vec3d omega;
+  cv::Rodrigues(cv::Matx33d(kR().data()), omega);
+  const auto camera = [](const Numbers& K, const Numbers& D) {
+    return fmt::format("{{\"f\": [{}, {}], \"c\": [{}, {}], \"k\": [{}]}}", K[0], K[4], K[2], K[5], list(D));
+  };
+  for (const auto& [open, close] : {std::pair{"", ""}, std::pair{"[", "]"}})
+    expect_the_pair(
+        "camcal.json",
+        fmt::format("{{\"data\": {{\"width\": 640, \"height\": 480, \"intrinsics\": [{}, {}], "
+                    "\"extrinsics\": {}{{\"om\": [{:.14g}, {:.14g}, {:.14g}], \"T\": [{}]}}{}}}}}",
+                    camera(kK1, kD1), camera(kK2, kD2), open, omega[0], omega[1], omega[2], list(kT), close));
+}
+
+TEST_F(CalibrationFile, MayBeOnePerCameraOnABody) {
+  // The body's axes are any; only how the cameras stand to each other counts.
+  const Mat3 body = Eigen::AngleAxisd(1.1, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  const Vec3 place(40, -7, 12);
+  const auto sensor = [&](const std::string& name, const Numbers& K, const Numbers& D, const Mat3& R, const Vec3& t) {
+    Numbers rows;
+    for (int i = 0; i < 3; ++i) rows.insert(rows.end(), {R(i, 0), R(i, 1), R(i, 2), t[i]});
+    rows.insert(rows.end(), {0, 0, 0, 1});
+    std::filesystem::create_directories(folder_ / name);
+    return folder_.write(
+        name + "/sensor.yaml",
+        fmt::format("sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [{:.15g}]\nrate_hz: 20\n"
+                    "resolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}] #fu, fv\n"
+                    "distortion_model: radial-tangential\ndistortion_coefficients: [{}]\n",
+                    fmt::join(rows, ", "), K[0], K[4], K[2], K[5], list(D)));
+  };
+  sensor("cam1", kK2, kD2, body * turn().transpose(), place - body * turn().transpose() * Vec3(kT[0], kT[1], kT[2]));
+  const StereoRig rig = read_rig(sensor("cam0", kK1, kD1, body, place));
+  EXPECT_LT((rig.right_from_left - turn()).norm(), 1e-9);
+  EXPECT_LT((rig.right_from_left_mm - Vec3(kT[0], kT[1], kT[2])).norm(), 1e-9);
+  EXPECT_EQ(rig.right.distortion, kD2);
+  EXPECT_EQ(rig.image_size, cv::Size(640, 480));
+}
+
 TEST(CalibrationData, OfTheHamlynHeartAndOfMiddleburyAreRead) {
   PALPATE_NEEDS_REFERENCE("hamlyn_heart/calib.left.intrinsic.txt");
   const StereoRig heart = read_rig(test::reference_data() / "hamlyn_heart/calib.left.intrinsic.txt");
@@ -244,6 +298,32 @@ TEST_F(CalibrationFile, MayBeAMessageOfRosOneOrTwo) {
     EXPECT_EQ(rig.image_size, cv::Size(640, 480));
     EXPECT_EQ(rig.left.distortion, kD1);
   }
+}
+
+TEST_F(CalibrationFile, OfSeveralPictureSizesIsRefused) {
+  EXPECT_THAT(refusal("two.yaml",
+                      "hd:\n  left: {fx: 700, fy: 700, cx: 640, cy: 360}\nfhd:\n  left: {fx: 1050, fy: 1050, "
+                      "cx: 960, cy: 540}\n"),
+              AllOf(HasSubstr("fhd.left.fx is 1050"), HasSubstr("another fx of that camera is 700")));
+  EXPECT_THAT(refusal("SN1234.conf", "[LEFT_CAM_HD]\nfx=700\n[STEREO]\nBaseline=120\nRX_HD=0.001\n"),
+              HasSubstr("a factory file of a ZED camera"));
+}
+
+TEST_F(CalibrationFile, GoesOnWithTheSameMessageWhereATopicWasEchoed) {
+  const std::string message = fmt::format("M1: [{}]\nD1: [{}]\nM2: [{}]\nD2: [{}]\nR: [{}]\nT: [{}]\n", list(kK1),
+                                          list(kD1), list(kK2), list(kD2), list(kR()), list(kT));
+  expect_the_pair("echo.yaml", "header: {seq: 1}\n" + message + "---\nheader: {seq: 2}\n" + message + "---\n");
+}
+
+TEST_F(CalibrationFile, WithPosesOfBothCamerasHasTheirDifference) {
+  const Mat3 world = Eigen::AngleAxisd(0.4, Vec3::UnitZ()).toRotationMatrix();
+  const Vec3 place(3, 4, 5), right = turn() * place + Vec3(kT[0], kT[1], kT[2]);
+  expect_the_pair(
+      "world.yaml",
+      fmt::format("M1: [{}]\nD1: [{}]\nM2: [{}]\nD2: [{}]\nR1: [{}]\nT1: [3, 4, 5]\nR2: [{}]\nT2: [{:.15g}, "
+                  "{:.15g}, {:.15g}]\n",
+                  list(kK1), list(kD1), list(kK2), list(kD2), list(rows_of(world)), list(rows_of(turn() * world)),
+                  right.x(), right.y(), right.z()));
 }
 
 TEST_F(CalibrationFile, ThatIsNotUnderstoodNamesItsKeysAndTheNearest) {

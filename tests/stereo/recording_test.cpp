@@ -160,6 +160,45 @@ TEST(Recording, TakesNumbersOfImagesAsTheirTime) {
   EXPECT_NEAR(Recording(options).timing().offset_ms, 3, 1e-3);
 }
 
+TEST(Recording, TakesTheTimesOfImagesFromAFileBesideThem) {
+  const TemporaryFolder folder;
+  for (const char* camera : {"image_0", "image_1"}) {
+    std::filesystem::create_directories(folder / camera);
+    for (int i = 0; i < 4; ++i)
+      cv::imwrite((folder / camera / fmt::format("{:06d}.png", i)).string(), picture({64, 48}, kLeftLevel, i));
+  }
+  RecordingOptions options;
+  options.left = folder / "image_0" / "%06d.png";
+  options.right = folder / "image_1" / "%06d.png";
+  const auto expect_times = [&](const char* what) {
+    EXPECT_EQ(pairs_and_times(options), std::pair("1111"s, "0,1,3,4.5"s)) << what;
+    EXPECT_THAT(Recording(options).notes(), testing::Contains(HasSubstr("times of the images from"))) << what;
+  };
+  folder.write("times.txt", "0.000000e+00\n4.000000e-02\n1.200000e-01\n1.800000e-01\n");
+  expect_times("KITTI");
+  folder.write("times.txt", "1403636579000000000\n1403636579040000000\n1403636579120000000\n1403636579180000000\n");
+  expect_times("nanoseconds");
+  folder.write("times.txt",
+               "2011-09-26 13:02:25.960\n2011-09-26 13:02:26.000\n2011-09-26 13:02:26.080\n2011-09-26 13:02:26.140\n");
+  expect_times("dates");
+  std::filesystem::remove(folder / "times.txt");
+  for (const char* camera : {"image_0", "image_1"})
+    folder.write(std::string(camera) + "/data.csv",
+                 "#timestamp [ns],filename\n1000000000,000000.png\n1040000000,000001.png\n1080000000,left out.png\n"
+                 "1120000000,000002.png\n1180000000,000003.png\n");
+  expect_times("EuRoC");
+  options.fps = 50;
+  EXPECT_EQ(pairs_and_times(options).second, "0,0.5,1,1.5");
+  options.fps = 0;
+  for (const char* camera : {"image_0", "image_1"}) std::filesystem::remove(folder / camera / "data.csv");
+  folder.write("times.txt", "0\n0.04\n");
+  EXPECT_EQ(pairs_and_times(options).second, "0,1,2,3");
+  EXPECT_THAT(Recording(options).notes(),
+              testing::Contains(HasSubstr("holds 2 times, expected one for each of the 4")));
+  folder.write("times.txt", "0\n1\n2\n3\n");
+  EXPECT_EQ(pairs_and_times(options).second, "0,1,2,3");
+}
+
 TEST(Recording, OpensNamesWithAPercentSign) {
   const TemporaryFolder folder;
   RecordingOptions options;
@@ -337,6 +376,17 @@ TEST(Recording, EndsUnfinishedWhenTheVideoIsTruncated) {
   EXPECT_LT(frames, 60);
   EXPECT_THAT(sentence,
               AllOf(HasSubstr("both.avi"), HasSubstr(fmt::format("after {} frames", frames)), HasSubstr("60")));
+}
+
+TEST(Recording, EndsUnfinishedWhenTheVideoShrinksWhileItIsRead) {
+  const TemporaryFolder folder;
+  RecordingOptions options;
+  options.stereo = folder / "both.avi";
+  write_video(options.stereo, both_eyes(120, StereoLayout::side_by_side));
+  Recording recording(options);
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(recording.next());
+  std::filesystem::resize_file(options.stereo, std::filesystem::file_size(options.stereo) / 2);
+  EXPECT_THROW(while (recording.next()){}, Unfinished);
 }
 
 }  // namespace
