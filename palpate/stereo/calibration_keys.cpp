@@ -145,7 +145,6 @@ bool is_first_extrinsic(const std::vector<std::string>& segments) {
 struct Recognised {
   CalibrationValue value;
   Side side;
-  bool may_be_pose = false;  ///< R1: of the first camera in the world where there is a T1, else of cv::stereoRectify
 };
 
 Recognised recognise(const CalibrationEntry& entry) {
@@ -204,10 +203,8 @@ Recognised recognise(const CalibrationEntry& entry) {
     result.value.role = role == Role::distortion ? role : by_size(role, whole, entry.numbers.size());
     // R1 and P1 of cv::stereoRectify; RotationOfCamera2 is the one rotation there is.
     const bool numbered = own.number >= 0 || own.eye != Eye::unknown;
-    if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9) {
+    if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9)
       result.value.role = Role::rectification;
-      result.may_be_pose = true;
-    }
     if (name == "rotationofcamera" || name == "translationofcamera") own = side = {};
     if (result.value.role == Role::transform) own = side = {};
     if (is_first_extrinsic(segments)) side = {};
@@ -225,13 +222,9 @@ std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& en
     found.push_back(recognise(entry));
     from_zero = from_zero || (found.back().side.number == 0 && found.back().value.role != Role::none);
   }
-  const bool has_poses = std::any_of(found.begin(), found.end(), [](const Recognised& one) {
-    return one.value.role == Role::translation && (one.side.eye != Eye::unknown || one.side.number >= 0);
-  });
   std::vector<CalibrationValue> values;
   for (const Recognised& one : found) {
     CalibrationValue value = one.value;
-    if (one.may_be_pose && has_poses) value.role = Role::rotation;
     value.eye = one.side.eye;
     if (value.eye == Eye::unknown && one.side.number >= 0) {
       const int first = from_zero ? 0 : 1;

@@ -315,17 +315,6 @@ TEST_F(CalibrationFile, GoesOnWithTheSameMessageWhereATopicWasEchoed) {
   expect_the_pair("echo.yaml", "header: {seq: 1}\n" + message + "---\nheader: {seq: 2}\n" + message + "---\n");
 }
 
-TEST_F(CalibrationFile, WithPosesOfBothCamerasHasTheirDifference) {
-  const Mat3 world = Eigen::AngleAxisd(0.4, Vec3::UnitZ()).toRotationMatrix();
-  const Vec3 place(3, 4, 5), right = turn() * place + Vec3(kT[0], kT[1], kT[2]);
-  expect_the_pair(
-      "world.yaml",
-      fmt::format("M1: [{}]\nD1: [{}]\nM2: [{}]\nD2: [{}]\nR1: [{}]\nT1: [3, 4, 5]\nR2: [{}]\nT2: [{:.15g}, "
-                  "{:.15g}, {:.15g}]\n",
-                  list(kK1), list(kD1), list(kK2), list(kD2), list(rows_of(world)), list(rows_of(turn() * world)),
-                  right.x(), right.y(), right.z()));
-}
-
 TEST_F(CalibrationFile, ThatIsNotUnderstoodNamesItsKeysAndTheNearest) {
   std::string text = file_storage("camra_matrix_left", "D1", "M2", "D2");
   EXPECT_THAT(refusal("c.yaml", text), AllOf(HasSubstr("no camera matrix of the left camera"),
