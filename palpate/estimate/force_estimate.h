@@ -5,6 +5,7 @@
 
 #include "palpate/core/geometry.h"
 #include "palpate/infer/band.h"
+#include "palpate/infer/contact_tangent.h"
 #include "palpate/infer/hypotheses.h"
 
 namespace palpate {
@@ -34,6 +35,8 @@ struct ForceEstimate {
   Vec3 force_N = Vec3::Zero();
   double mean_nodal_force_N = 0;  ///< F_f of the paper
   Vec3 tip_mm = Vec3::Zero();
+  Vec3 tip_velocity_mm_per_s = Vec3::Zero();  ///< as the images or the track tell it; zero where they do not
+  ContactTangent tangent;                     ///< in contact: how the force follows the tip
   double max_von_mises_kPa = 0;
   double residual = 0;
   double misfit_mm = 0;

@@ -125,6 +125,7 @@ struct ForceEstimator::State {
     estimate.status = FrameStatus::not_converged;
     if (!answer.converged) return;
     estimate.force_N = answer.force_N;
+    estimate.tangent = answer.tangent;
     estimate.mean_nodal_force_N = answer.mean_nodal_force_N;
     estimate.band = force_band(answer.force_N, answer.force_covariance_N2);
     if (const double beyond = touchable.beyond_edge(answer.place_mm, answer.footprint_mm); beyond > 0) {
@@ -140,6 +141,7 @@ struct ForceEstimator::State {
     estimate.status = FrameStatus::tool_lost;
     estimate.in_contact = false;
     estimate.force_N.setZero();
+    estimate.tangent = {};
     estimate.mean_nodal_force_N = 0;
   }
 
@@ -233,6 +235,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
     if (is_told && answer.instruments[i].hold == Hold::free)
       answer.instruments[i].tip_mm = answer.scene.apply(*s.held_at_mm);
     s.report(answer.instruments[i], answer, is_told || instruments.tips[i].visible, of(i));
+    of(i).tip_velocity_mm_per_s = instruments.tips[i].velocity_mm_per_s;
     of(i).scene_mm = answer.scene.translation_mm;
   }
   if (answer.equilibrium) s.show(answer, estimate);

@@ -18,6 +18,9 @@ void FilterState::report(size_t instrument, const ContactFit& fit, const TipObse
   answer.converged = fit.converged;
   answer.force_N = R * force.force_N;
   answer.force_covariance_N2 = R * force_covariance(force, fit) * R.transpose();
+  const auto row = 3 * static_cast<Eigen::Index>(k);
+  answer.tangent = {R * body->response.force.block<3, 3>(row, row) * R.transpose(), R * fit.posterior.q_mm(k),
+                    R * model.footprint(k).normal};
   const ContactForce& solved = body->response.equilibrium.contacts[k];
   const double solved_N = solved.force_N.norm();
   answer.mean_nodal_force_N =

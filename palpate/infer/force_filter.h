@@ -9,6 +9,7 @@
 #include "palpate/contact/contact_model.h"
 #include "palpate/contact/contact_options.h"
 #include "palpate/infer/belief.h"
+#include "palpate/infer/contact_tangent.h"
 #include "palpate/infer/hypotheses.h"
 #include "palpate/instrument/instrument_tracker.h"
 #include "palpate/observe/tissue_tracker.h"
@@ -39,6 +40,7 @@ struct InstrumentAnswer {
   Vec3 force_N = Vec3::Zero();  ///< of the instrument on the tissue, left camera frame
   Mat3 force_covariance_N2 = Mat3::Zero();
   Vec3 place_mm = Vec3::Zero(), q_mm = Vec3::Zero();  ///< middle of the patch at rest, and how it is displaced
+  ContactTangent tangent;
   double mean_nodal_force_N = 0;
   double footprint_mm = 0;
   double misfit_mm = 0;
