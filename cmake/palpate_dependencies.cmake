@@ -33,3 +33,13 @@ find_package(embree 4 QUIET)
 if(NOT embree_FOUND)
   find_package(embree 3 REQUIRED)
 endif()
+
+# OpenIGTLink's own USE_FILE would change the compiler's flags for everything.
+find_path(OPENIGTLINK_INCLUDE igtlMessageBase.h PATH_SUFFIXES openigtlink REQUIRED)
+find_library(OPENIGTLINK_LIBRARY OpenIGTLink REQUIRED)
+add_library(palpate_openigtlink INTERFACE)
+target_include_directories(palpate_openigtlink SYSTEM INTERFACE ${OPENIGTLINK_INCLUDE})
+target_link_libraries(palpate_openigtlink INTERFACE ${OPENIGTLINK_LIBRARY})
+
+find_package(CycloneDDS REQUIRED)
+find_program(IDLC idlc REQUIRED)

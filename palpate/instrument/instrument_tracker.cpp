@@ -78,6 +78,7 @@ struct InstrumentTracker::State {
   RowOffset rows;
   std::vector<InstrumentFinder> finders;  ///< one for each eye
   std::vector<TipTrack> tracks;
+  std::function<std::optional<TipTrack::Row>()> live_tip;
   double time_offset_s = 0;
   std::vector<TipTracker> trackers;
   std::array<int, kMostInstruments> frames_seen{};
@@ -267,13 +268,21 @@ void describe(Settings& settings, InstrumentOptions& options) {
                   "from there on its colours count "
                   "too");
   settings.integer("at_frame", options.at_frame, {0, 1e9}, "the frame of example_px");
-  settings.path("track", options.track, "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images");
+  settings.path(
+      "track", options.track,
+      "tip.csv (frame,time_s,x_mm,y_mm,z_mm[,closed]) instead of the images; or openigtlink:HOST:PORT/DEVICE, "
+      "a live TRANSFORM (docs/streams.md)");
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
   settings.group("camera_from_robot", "how the axes of the tracks lie; palpate check finds it",
                  [&options](Settings& group) { describe(group, options.camera_from_robot); });
   settings.number("time_offset_s", options.time_offset_s, {},
                   "time of the tracks minus time of the video; other than 0, rows are found by time, not by frame");
   settings.after_reading([&options] {
+    // A source is no file, and does not lie in the scene file's folder.
+    if (const std::string source = options.track.parent_path().filename().string(); source.starts_with("openigtlink:"))
+      options.track = source + "/" + options.track.filename().string();
+    if (options.has_live_track() && !options.track_2.empty())
+      throw BadInput("instrument.track is live, expected no instrument.track_2 beside it");
     if (!options.track_2.empty() && options.track.empty())
       throw BadInput("instrument.track_2 is given without instrument.track, expected both or only track");
     if (options.segmentation.extension() == ".onnx") return;
@@ -291,8 +300,12 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
   state_->rectification = rectification;
   if (!options.example_px.empty()) state_->example = rectified_polygon_mask(rectification, around(options.example_px));
   state_->example_frame = options.at_frame;
+  state_->live_tip = options.live_tip;
+  if (options.has_live_track() && !options.live_tip)
+    throw BadInput("instrument.track is live, expected a run that streams (palpate estimate --realtime)");
   for (const std::filesystem::path& track : {options.track, options.track_2})
-    if (!track.empty()) state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
+    if (!track.empty() && !options.has_live_track())
+      state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
   state_->time_offset_s = options.time_offset_s;
   std::array<std::optional<InstrumentFinder>, 2> finders;
   tbb::parallel_invoke([&] { finders[0].emplace(options, static_frame.left, organ_mask); },
@@ -322,7 +335,8 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   observations.left_mask = seen[0].found.mask;
   observations.right_mask = seen[1].found.mask;
   for (size_t t = 0; t < s.tracks.size(); ++t) observations.tips[t] = s.trackers[t].update(s.row_of(s.tracks[t], pair));
-  if (!s.tracks.empty()) return observations;
+  if (s.live_tip) observations.tips[0] = s.trackers[0].update(s.live_tip());
+  if (!s.tracks.empty() || s.live_tip) return observations;
 
   const double seconds = s.last_time_s ? std::max(pair.time_s - *s.last_time_s, 1e-3) : 0.04;
   s.last_time_s = pair.time_s;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,6 +30,11 @@ struct InstrumentOptions {
   std::filesystem::path track_2;                  ///< the same for the second instrument
   CameraFromRobot camera_from_robot;              ///< axes of the tracks
   double time_offset_s = 0;                       ///< track time minus video time; 0: rows are found by frame number
+  /// Of a live track (`track: openigtlink:...`): the tip now, left camera frame; nothing while none is known. Set by
+  /// who listens to it.
+  std::function<std::optional<TipTrack::Row>()> live_tip;
+
+  bool has_live_track() const { return track.string().starts_with("openigtlink:"); }
 };
 
 void describe(Settings& settings, InstrumentOptions& options);
