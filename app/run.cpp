@@ -10,6 +10,7 @@
 #include "app/answer.h"
 #include "app/clear_results.h"
 #include "app/output_folder.h"
+#include "app/playback.h"
 #include "app/progress.h"
 #include "app/recording_check.h"
 #include "app/run_files.h"
@@ -25,6 +26,7 @@
 #include "palpate/feedback/quantile.h"
 #include "palpate/feedback/warnings.h"
 #include "palpate/instrument/tip_track.h"
+#include "palpate/stream/stream_hub.h"
 #include "palpate/volume/body_remarks.h"
 
 namespace palpate::app {
@@ -44,7 +46,7 @@ auto in_scene(const SceneFile& scene_file, const std::string& key, const Stage& 
     const std::string sentence = error.what();
     const auto names = [&sentence](const char* group) { return sentence.starts_with(group); };
     const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument") ||
-                           names("contact.") || names("uncertainty");
+                           names("contact.") || names("uncertainty") || names("streams");
     const std::filesystem::path& volume = scene_file.scene.map.volume;
     const std::string told = names_key                                                  ? ""
                              : !volume.empty() && sentence.starts_with(volume.string()) ? "map.volume: "
@@ -123,14 +125,16 @@ std::string text_of_comparison(const Comparison& c) {
   return text;
 }
 
-ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built) {
+ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built, const StreamHub* streams = nullptr) {
   const Scene& scene = scene_file.scene;
+  InstrumentOptions instrument = scene.instrument;
+  if (streams) instrument.live_tip = streams->live_tip();
   ForceUncertainty uncertainty = in_scene(scene_file, "uncertainty", [&] {
     return force_uncertainty(built.map, built.rectification, scene.map, scene.uncertainty,
                              scene.contact.footprint_radius_mm);
   });
   return in_scene(scene_file, "contact", [&] {
-    return ForceEstimator(built.map, built.frame, built.rectification, scene.instrument, scene.contact, scene.tuning,
+    return ForceEstimator(built.map, built.frame, built.rectification, instrument, scene.contact, scene.tuning,
                           std::move(uncertainty));
   });
 }
@@ -146,7 +150,7 @@ BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
     check_rig_fits(read, recording.size());
     return read;
   });
-  if (!scene.instrument.track.empty())
+  if (!scene.instrument.track.empty() && !scene.instrument.has_live_track())
     opened("instrument.track", [&] { return read_tip_track(scene.instrument.track); });
   if (!quiet) fmt::print(stderr, "calibration {}\n", describe_rig(rig, recording.size()));
   BuiltMap built;
@@ -233,20 +237,27 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
 
   const Scene& scene = scene_file.scene;
-  ForceEstimator estimator = make_estimator(scene_file, built);
+  StreamHub streams = in_scene(scene_file, "streams", [&] {
+    const StreamScene live = stream_scene(built.map, built.rectification.rig, built.fps, scene.contact.friction);
+    return StreamHub(scene_file.streams, live, scene.instrument);
+  });
+  if (!options.quiet)
+    for (const std::string& note : streams.notes()) fmt::print(stderr, "streams     {}\n", note);
+  ForceEstimator estimator = make_estimator(scene_file, built, &streams);
   Recording recording(scene.recording);
+  Playback playback(recording, options.realtime);
   begin_results(options.folder);
-  RunFiles files(scene_file, options.folder, built, recording, std::move(truths));
+  RunFiles files(scene_file, options.folder, built, recording, std::move(truths), streams);
   files.losses.attempt([&] { write_map_files(built, options.folder); });
   const auto loop = [&] {
     Progress progress("estimate", options.quiet);
-    while (auto frame = recording.next()) {
-      const ForceEstimate estimate = estimator.update(*frame);
-      files.add(*frame, estimate);
+    while (const auto played = playback.next()) {
+      const ForceEstimate estimate = played->passed_over ? passed_over(played->frame) : estimator.update(played->frame);
+      files.add(*played, estimate);
       progress.show(
-          frame->index + 1, recording.frame_count(),
+          played->frame.index + 1, recording.frame_count(),
           fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
-      if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
+      if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", played->frame.index));
     }
   };
   try {
@@ -258,7 +269,9 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
   if (files.losses.any())
     throw Unfinished(
         fmt::format("{}; {} frames are kept in {}", files.losses.text(), files.rows.size(), options.folder.string()));
-  return summary_of(files, map_s);
+  RunSummary summary = summary_of(files, map_s);
+  summary.streams = streams.summary();
+  return summary;
 }
 
 std::string to_text(const RunSummary& summary) {
@@ -284,6 +297,7 @@ std::string to_text(const RunSummary& summary) {
     line("warning", fmt::format("{} frames: {} ({})", frames, warning_words(name), name));
   if (summary.peak_force_2_N)
     line("second instrument", fmt::format("peak force {:.2f} N, forces_2.csv", *summary.peak_force_2_N));
+  for (const std::string& stream : summary.streams) line("streams", stream);
   if (summary.comparison) text += text_of_comparison(*summary.comparison);
   if (summary.comparison_2) text += "second instrument:\n" + text_of_comparison(*summary.comparison_2);
   line("written to", summary.folder.string());
@@ -311,6 +325,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["peak_force_per_modulus_low_N_per_kPa"] = summary.peak_force_per_modulus_N_per_kPa[1];
   json["peak_force_per_modulus_high_N_per_kPa"] = summary.peak_force_per_modulus_N_per_kPa[2];
   if (summary.peak_force_2_N) json["peak_force_2_N"] = *summary.peak_force_2_N;
+  if (!summary.streams.empty()) json["streams"] = summary.streams;
   if (summary.comparison) json["comparison"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison));
   if (summary.comparison_2)
     json["comparison_2"] = nlohmann::ordered_json::parse(palpate::to_json(*summary.comparison_2));

@@ -14,6 +14,7 @@ struct RunOptions {
   std::filesystem::path folder;
   std::filesystem::path truth;  ///< empty = none; truth_2.csv beside it is that of a second instrument
   bool quiet = false;           ///< no progress, no sentences
+  bool realtime = false;        ///< the recording at its own rate; frames whose time is over are passed over
 };
 
 /// Figures of one run, for people and machines.
@@ -33,6 +34,7 @@ struct RunSummary {
   std::optional<Comparison> comparison;
   std::optional<double> peak_force_2_N;  ///< of a second instrument, where one came into view
   std::optional<Comparison> comparison_2;
+  std::vector<std::string> streams;  ///< what was sent, a line for each stream
 };
 
 /// A map, and the frame and recording it was built from.

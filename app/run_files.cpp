@@ -71,7 +71,7 @@ std::vector<ReportPicture> PictureChoice::chosen() const {
 }
 
 RunFiles::RunFiles(const SceneFile& s, const std::filesystem::path& f, const BuiltMap& b, const Recording& recording,
-                   Truths t)
+                   Truths t, StreamHub& hub)
     : scene_file(s),
       folder(f),
       built(b),
@@ -79,16 +79,18 @@ RunFiles::RunFiles(const SceneFile& s, const std::filesystem::path& f, const Bui
       forces(f / "forces.csv"),
       forces_2(f / "forces_2.csv"),
       painter(b.rectification, s.scene.tissue, s.overlay),
-      pictures(recording.frame_count(), force_unit(s.scene.tissue)) {
+      pictures(recording.frame_count(), force_unit(s.scene.tissue)),
+      streams(hub) {
   losses.attempt([&] { write_whole_file(folder / "run.yaml", run_yaml(scene_file, built.rectification, {})); });
   losses.attempt([&] { overlay.emplace(folder / "overlay.mp4", recording.fps(), recording.size()); });
 }
 
-void RunFiles::add(const StereoFrame& frame, ForceEstimate estimate) {
+void RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   Stopwatch watch;
-  const cv::Mat picture = painter.paint(frame.left, estimate);
+  const cv::Mat picture = painter.paint(played.frame.left, estimate);
   estimate.times.draw_ms = watch.lap_ms();
   for (ForceEstimate& other : estimate.further) other.times = estimate.times;
+  if (!played.passed_over) streams.publish(estimate, picture, played.decoded_ns);
   // First the picture: whenever the program dies, each row has its own.
   if (overlay && !losses.attempt([&] { overlay->write(picture); })) overlay.reset();
   forces.write(estimate);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/playback.h"
 #include "app/run.h"
 #include "app/scene_file.h"
 #include "palpate/core/errors.h"
@@ -13,6 +14,7 @@
 #include "palpate/feedback/overlay.h"
 #include "palpate/feedback/report.h"
 #include "palpate/feedback/video_writer.h"
+#include "palpate/stream/stream_hub.h"
 
 namespace palpate::app {
 
@@ -72,10 +74,11 @@ class PictureChoice {
 struct RunFiles {
   /// Begins forces.csv, run.yaml and overlay.mp4. Throws Unfinished when there cannot even be a forces.csv.
   RunFiles(const SceneFile& scene_file, const std::filesystem::path& folder, const BuiltMap& built,
-           const Recording& recording, Truths truths);
+           const Recording& recording, Truths truths, StreamHub& streams);
 
-  /// A row, and a picture where the disk still takes one. Throws Unfinished when it does not take the row.
-  void add(const StereoFrame& frame, ForceEstimate estimate);
+  /// A row, what is sent live, and a picture where the disk still takes one. Throws Unfinished when it does not take
+  /// the row.
+  void add(const PlayedFrame& played, ForceEstimate estimate);
 
   /// Ends the video, writes run.yaml and report.html; what fails is among the losses.
   void close();
@@ -90,6 +93,7 @@ struct RunFiles {
   std::optional<VideoWriter> overlay;
   OverlayPainter painter;
   PictureChoice pictures;
+  StreamHub& streams;
   std::vector<ForceRow> rows;
   std::vector<FrameTimes> times;
 };

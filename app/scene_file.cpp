@@ -18,6 +18,9 @@ void describe(Settings& settings, SceneFile& scene_file) {
       "simulate", "what DejaVu makes (palpate simulate)",
       [&scene_file](Settings& group) { palpate::describe(group, scene_file.simulate); }, &scene_file.has_simulate);
   settings.group(
+      "streams", "what is sent live (docs/streams.md)",
+      [&scene_file](Settings& group) { palpate::describe(group, scene_file.streams); }, &scene_file.has_streams);
+  settings.group(
       "run", "what a run found, written into run.yaml; without effect when read",
       [&scene_file](Settings& group) {
         group.matrix3("rectified_from_left", scene_file.rectified_from_left,

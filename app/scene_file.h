@@ -6,6 +6,7 @@
 #include "palpate/estimate/scene.h"
 #include "palpate/feedback/overlay.h"
 #include "palpate/simulate/simulate_options.h"
+#include "palpate/stream/stream_options.h"
 
 namespace palpate::app {
 
@@ -15,11 +16,13 @@ struct SceneFile {
   Scene scene;
   OverlayOptions overlay;
   SimulateOptions simulate;
+  StreamOptions streams;
   Mat3 rectified_from_left = Mat3::Identity();  ///< what a run found; written into run.yaml, without effect when read
   /// Greatest force over E as [value, 2.5 %, 97.5 %], N per kPa: does not depend on the E assumed.
   Vec3 peak_force_per_modulus_N_per_kPa = Vec3::Zero();
   bool has_recording = false;
   bool has_simulate = false;
+  bool has_streams = false;
   bool has_run = false;
 };
 

@@ -72,7 +72,9 @@ void add_check(CLI::App& app) {
     if (!arguments->folder.empty()) require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
     std::optional<TrackCheck> track;
-    if (!scene_file.scene.instrument.track.empty()) track = check_track(scene_file, built, arguments->json);
+    if (const InstrumentOptions& instrument = scene_file.scene.instrument;
+        !instrument.track.empty() && !instrument.has_live_track())
+      track = check_track(scene_file, built, arguments->json);
     if (!arguments->folder.empty()) write_check_pictures(scene_file, built, arguments->folder, arguments->json);
     if (arguments->json) {
       nlohmann::ordered_json json = json_of(scene_file, built);

@@ -15,6 +15,7 @@ const std::vector<std::pair<std::string, std::string>>& known_warnings() {
       {"tip_inferred", "tip hidden, the tissue tells the force"},
       {"camera_missing", "one camera has no picture"},
       {"sliding", "the tip slides over the tissue"},
+      {"frame_passed_over", "the next frame was there before this one could be looked at"},
       {"eyes_out_of_step", "the two videos do not show the same moment"},
   };
   return kWarnings;

@@ -1,0 +1,38 @@
+#include "app/playback.h"
+
+#include <poll.h>
+
+#include <algorithm>
+
+#include "app/runtime.h"
+#include "palpate/stream/clock.h"
+
+namespace palpate::app {
+
+std::optional<PlayedFrame> Playback::next() {
+  std::optional<StereoFrame> frame = recording_.next();
+  if (!frame) return std::nullopt;
+  PlayedFrame played;
+  played.frame = std::move(*frame);
+  if (realtime_) {
+    const auto at_ns = static_cast<int64_t>(1e9 * played.frame.time_s);
+    if (!start_ns_) start_ns_ = steady_ns() - at_ns;
+    const int64_t due_ns = *start_ns_ + at_ns;
+    while (!interrupted() && steady_ns() < due_ns)
+      poll(nullptr, 0, static_cast<int>(std::clamp<int64_t>((due_ns - steady_ns()) / 1'000'000, 1, 50)));
+    played.passed_over = recording_.fps() > 0 && steady_ns() > due_ns + static_cast<int64_t>(1e9 / recording_.fps());
+  }
+  played.decoded_ns = steady_ns();
+  return played;
+}
+
+ForceEstimate passed_over(const StereoFrame& frame) {
+  ForceEstimate estimate;
+  estimate.frame = frame.index;
+  estimate.time_s = frame.time_s;
+  estimate.status = FrameStatus::tool_lost;
+  estimate.warnings = {"frame_passed_over"};
+  return estimate;
+}
+
+}  // namespace palpate::app

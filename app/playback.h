@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "palpate/estimate/force_estimate.h"
+#include "palpate/stereo/recording.h"
+
+namespace palpate::app {
+
+struct PlayedFrame {
+  StereoFrame frame;
+  int64_t decoded_ns = 0;    ///< steady clock (palpate/stream/clock.h), when both pictures were there
+  bool passed_over = false;  ///< its time is over: the next one is there already
+};
+
+/// The frames of a recording, as fast as they are asked for, or at the rate at which they were recorded.
+class Playback {
+ public:
+  Playback(Recording& recording, bool realtime) : recording_(recording), realtime_(realtime) {}
+
+  /// Waits for the frame's time, not longer than it takes to be interrupted.
+  std::optional<PlayedFrame> next();
+
+ private:
+  Recording& recording_;
+  bool realtime_;
+  std::optional<int64_t> start_ns_;
+};
+
+/// The row of a frame that was passed over.
+ForceEstimate passed_over(const StereoFrame& frame);
+
+}  // namespace palpate::app
