@@ -9,6 +9,13 @@
 
 namespace palpate::app {
 
+namespace {
+
+/// In a row: with more the force loop would have to take frames for lost.
+constexpr int kMaxPassedOver = 2;
+
+}  // namespace
+
 std::optional<PlayedFrame> Playback::next() {
   std::optional<StereoFrame> frame = recording_.next();
   if (!frame) return std::nullopt;
@@ -20,7 +27,12 @@ std::optional<PlayedFrame> Playback::next() {
     const int64_t due_ns = *start_ns_ + at_ns;
     while (!interrupted() && steady_ns() < due_ns)
       poll(nullptr, 0, static_cast<int>(std::clamp<int64_t>((due_ns - steady_ns()) / 1'000'000, 1, 50)));
-    played.passed_over = recording_.fps() > 0 && steady_ns() > due_ns + static_cast<int64_t>(1e9 / recording_.fps());
+    const int64_t late_ns = steady_ns() - due_ns;
+    const bool is_over = recording_.fps() > 0 && late_ns > static_cast<int64_t>(1e9 / recording_.fps());
+    played.passed_over = is_over && passed_over_ < kMaxPassedOver;
+    passed_over_ = played.passed_over ? passed_over_ + 1 : 0;
+    // A computer that cannot keep up plays more slowly: it does not pass over everything.
+    if (is_over && !played.passed_over) *start_ns_ += late_ns;
   }
   played.decoded_ns = steady_ns();
   return played;

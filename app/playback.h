@@ -14,7 +14,8 @@ struct PlayedFrame {
   bool passed_over = false;  ///< its time is over: the next one is there already
 };
 
-/// The frames of a recording, as fast as they are asked for, or at the rate at which they were recorded.
+/// The frames of a recording, as fast as they are asked for, or at the rate at which they were recorded: then a frame
+/// whose time is over is passed over, and where the computer cannot keep up all the same, the clock is slowed down.
 class Playback {
  public:
   Playback(Recording& recording, bool realtime) : recording_(recording), realtime_(realtime) {}
@@ -26,6 +27,7 @@ class Playback {
   Recording& recording_;
   bool realtime_;
   std::optional<int64_t> start_ns_;
+  int passed_over_ = 0;  ///< in a row, until now
 };
 
 /// The row of a frame that was passed over.
