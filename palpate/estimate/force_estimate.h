@@ -6,6 +6,7 @@
 #include "palpate/core/geometry.h"
 #include "palpate/infer/band.h"
 #include "palpate/infer/contact_tangent.h"
+#include "palpate/infer/correlation.h"
 #include "palpate/infer/hypotheses.h"
 
 namespace palpate {
@@ -42,6 +43,7 @@ struct ForceEstimate {
   double misfit_mm = 0;
   ForceBand band;        ///< from the images, at the stated tissue
   ForceBand total_band;  ///< with what is not known of the tissue
+  ForceCorrelation correlation;  ///< where the band comes from
   Hold grip = Hold::free;
   double p_contact = 0;
   double footprint_mm = 0;       ///< radius as estimated

@@ -19,11 +19,6 @@ namespace palpate {
 
 namespace {
 
-/// Fraction of the tissue points below which an obscured picture shows nothing, and a clear one another scene.
-constexpr double kMinPointsObscured = 0.6, kMinPoints = 0.25;
-/// A hidden tip's force is told where its deviation is below this ratio of it.
-constexpr double kTellingDeviation = 0.4;
-
 /// A patch all of whose radius lies beyond the edge of what was seen finds half the tissue to hold it, or all: log 2 at
 /// two deviations.
 constexpr double kEdgeLogDeviation = 0.35;
@@ -132,12 +127,13 @@ struct ForceEstimator::State {
       estimate.warnings.push_back("near_map_edge");
       estimate.band = total_band(estimate.band, answer.force_N.norm(), kEdgeLogDeviation * beyond);
     }
+    estimate.correlation = answer.correlation;
     estimate.total_band =
         total_band(estimate.band, answer.force_N.norm(), uncertainty.log_deviation(answer.place_mm, answer.q_mm));
     const bool is_believed = whole.explained && answer.stretch < kMaxStretch;
     estimate.status = is_believed ? FrameStatus::ok : FrameStatus::map_stale;
     const double half_width_N = 0.5 * (estimate.band.high_N - estimate.band.low_N);
-    if (!answer.tip_inferred || half_width_N < 2 * kTellingDeviation * estimate.force_N.norm()) return;
+    if (!answer.tip_inferred || half_width_N < 2 * tuning.telling_deviation * estimate.force_N.norm()) return;
     estimate.status = FrameStatus::tool_lost;
     estimate.in_contact = false;
     estimate.force_N.setZero();
@@ -220,10 +216,10 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   estimate.times.track_ms = watch.lap_ms();
 
   const auto found = static_cast<double>(evidence.tissue.size()), asked = static_cast<double>(wanted.size());
-  const bool obscured = quality.obscured && found < kMinPointsObscured * asked;
+  const bool obscured = quality.obscured && found < s.tuning.min_points_obscured * asked;
   FrameAnswer answer;
   if (after_map && !obscured) answer = s.filter.update(evidence);
-  if (after_map && found < kMinPoints * asked) answer.explained = false;
+  if (after_map && found < s.tuning.min_points * asked) answer.explained = false;
   estimate.times.solve_ms = watch.lap_ms();
 
   for (size_t i = 0; i < kMostInstruments; ++i) {

@@ -21,6 +21,7 @@ void FilterState::report(size_t instrument, const ContactFit& fit, const TipObse
   const auto row = 3 * static_cast<Eigen::Index>(k);
   answer.tangent = {R * body->response.force.block<3, 3>(row, row) * R.transpose(), R * fit.posterior.q_mm(k),
                     R * model.footprint(k).normal};
+  answer.correlation = force_correlation(force, fit.posterior, k);
   const ContactForce& solved = body->response.equilibrium.contacts[k];
   const double solved_N = solved.force_N.norm();
   answer.mean_nodal_force_N =

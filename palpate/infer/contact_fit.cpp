@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/infer/agreed_radius.h"
+
 namespace palpate {
 
 namespace {
@@ -25,28 +27,6 @@ std::vector<Measurement> rows_of(const FrameData& data, const PredictedBody& bod
   return rows;
 }
 
-/// The radius that tissue and operator agree on: the tissue's is known to tissue_radius, the stated one is right to
-/// stated_radius or says nothing (Cauchy). Mode and variance of the log radius.
-struct AgreedRadius {
-  double log_radius, variance;
-};
-
-AgreedRadius agree(double told, double told_variance, double stated, const InferenceParameters& parameters) {
-  const double variance = told_variance + parameters.tissue_radius * parameters.tissue_radius;
-  const auto cost = [&](double x) {
-    return 0.5 * std::pow(x - told, 2) / variance + std::log1p(std::pow((x - stated) / parameters.stated_radius, 2));
-  };
-  constexpr int kSteps = 200;
-  double best = told;
-  for (int i = 0; i <= kSteps; ++i) {
-    const double x = told + (stated - told) * i / kSteps;
-    if (cost(x) < cost(best)) best = x;
-  }
-  const double d2 = std::pow((best - stated) / parameters.stated_radius, 2);
-  const double from_stated = 2 / (std::pow(parameters.stated_radius, 2) * (1 + d2));
-  return {best, 1 / (1 / variance + from_stated)};
-}
-
 /// What is kept knows nothing of the operator's word on the radius, so that it is heard once and not in every frame
 /// anew; `posterior` has heard it.
 ContactFit fit_rows(const Belief& prior, const FrameData& data, const PredictedBody& body, const ContactModel* model,
@@ -59,7 +39,7 @@ ContactFit fit_rows(const Belief& prior, const FrameData& data, const PredictedB
   for (size_t k = 0; k < prior.contacts() && context.tissue_drives; ++k) {
     const Eigen::Index at = Unknowns::log_radius(k);
     const AgreedRadius radius =
-        agree(fit.kept.mean[at], fit.kept.covariance(at, at), context.stated_log_radius, context.parameters);
+        agreed_radius(fit.kept.mean[at], fit.kept.covariance(at, at), context.stated_log_radius, context.parameters);
     fit.posterior.mean[at] = radius.log_radius;
     fit.posterior.covariance.row(at).setZero();
     fit.posterior.covariance.col(at).setZero();

@@ -54,8 +54,8 @@ std::vector<PatchReach> FilterState::reaches(const Belief& prior) const {
   for (size_t k = 0; k < model.contact_count(); ++k) {
     const Eigen::Index at = Unknowns::log_radius(k);
     const double deviation = std::min(parameters.log_radius, std::sqrt(prior.covariance(at, at)));
-    result.push_back({model.footprint(k).center_mm, std::exp(std::log(model.radius_mm(k)) - deviation),
-                      model.distance_to_attachments_mm(k)});
+    const double radius_mm = model.radius_mm(k);
+    result.push_back({model.footprint(k).center_mm, radius_mm, radius_mm * std::exp(-deviation)});
   }
   return result;
 }

@@ -19,7 +19,7 @@ struct Hand {
   std::optional<Vec3> released_at_mm;  ///< in the map frame, until it has left
   std::optional<bool> was_closed;
   bool is_confirmed = true;  ///< the tissue of a later frame has said that it holds
-  bool is_told = false;  ///< the operator says where it holds; there is no tip
+  bool is_told = false;      ///< the operator says where it holds; there is no tip
   double onset_s = 0;
   SceneMotion free_scene;            ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();  ///< the offset with which the patch was laid

@@ -10,6 +10,7 @@
 #include "palpate/contact/contact_options.h"
 #include "palpate/infer/belief.h"
 #include "palpate/infer/contact_tangent.h"
+#include "palpate/infer/correlation.h"
 #include "palpate/infer/hypotheses.h"
 #include "palpate/instrument/instrument_tracker.h"
 #include "palpate/observe/tissue_tracker.h"
@@ -41,6 +42,7 @@ struct InstrumentAnswer {
   Mat3 force_covariance_N2 = Mat3::Zero();
   Vec3 place_mm = Vec3::Zero(), q_mm = Vec3::Zero();  ///< middle of the patch at rest, and how it is displaced
   ContactTangent tangent;
+  ForceCorrelation correlation;
   double mean_nodal_force_N = 0;
   double footprint_mm = 0;
   double misfit_mm = 0;

@@ -7,11 +7,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("point_px", p.point_px, positive, "deviation of a tracked point in one camera");
   settings.number("point_dof", p.point_dof, positive, "Student-t degrees of freedom of a point");
   settings.number("effective_points", p.effective_points, positive, "effective sample size of a frame's points");
-  settings.number("motion_error", p.motion_error, {0, 10}, "error of the model's motion of a point, ratio to it");
-  settings.number("far_motion_error", p.far_motion_error, {0, 10},
-                  "the same as far from the patch as its attachments are; grows with the square of the distance");
-  settings.number("rim_motion_error", p.rim_motion_error, {0, 10},
-                  "the same two radii from the middle of the patch; grows with the fourth power of nearness");
+  settings.number("motion_error", p.motion_error, {0, 10},
+                  "error of the model's motion of a point, ratio to a half-space's (displacement x radius / distance)");
   settings.number("tip_floor_mm", p.tip_floor_mm, positive, "min. deviation of the tip's displacement");
   settings.number("tip_disparity_px", p.tip_disparity_px, positive, "the same along the viewing ray, of the disparity");
   settings.number("tip_dof", p.tip_dof, positive, "Student-t degrees of freedom of the tip");
@@ -27,7 +24,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("max_radius_ratio", p.max_radius_ratio, {1, 100}, "largest radius over the stated one");
   settings.number("offset_mm", p.offset_mm, positive, "prior of measured tip minus middle of the patch, each axis");
   settings.number("touch_mm", p.touch_mm, positive, "displacement of the patch in the frame of onset");
-  settings.number("stated_radius", p.stated_radius, positive, "the same where the stated radius is right (Cauchy)");
+  settings.number("stated_radius", p.stated_radius, positive, "the same where the stated radius is right");
+  settings.number("stated_right", p.stated_right, probability, "probability that the stated radius is right");
   settings.number("skew", p.skew, positive,
                   "prior of the common error of the model's motion of all tissue, ratio to it");
   settings.number("tissue_radius", p.tissue_radius, positive, "error of the log radius that the tissue tells");
@@ -57,6 +55,12 @@ void describe(Settings& settings, InferenceParameters& p) {
                   "a point farther from its prediction is not explained");
   settings.number("unexplained_ratio", p.unexplained_ratio, probability,
                   "more of the points than this unexplained: map_stale");
+  settings.number("min_points_obscured", p.min_points_obscured, probability,
+                  "fraction of the points below which an obscured picture shows nothing");
+  settings.number("min_points", p.min_points, probability,
+                  "fraction of the points below which a clear picture shows another scene");
+  settings.number("telling_deviation", p.telling_deviation, positive,
+                  "a hidden tip's force is told where its deviation is below this ratio of it");
   settings.number("model_error", p.model_error, {0, 10}, "of the force, ratio to it: what the model's form leaves");
 }
 

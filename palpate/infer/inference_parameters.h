@@ -7,13 +7,11 @@ namespace palpate {
 /// Every number that the inference decides by (docs/inference.md says where each comes from).
 struct InferenceParameters {
   // What is measured, and how well.
-  double point_px = 0.07;          ///< deviation of a tracked point in one camera, px
-  double point_dof = 4;            ///< Student-t degrees of freedom of a point
-  double effective_points = 25;    ///< effective sample size: more points share their errors with neighbours
-  double motion_error = 0.04;      ///< error of the model's motion of a point, ratio to that motion
-  double far_motion_error = 0.6;   ///< the same as far from the patch as its attachments; grows with the square
-  double rim_motion_error = 0.1;   ///< the same at two radii from the middle of the patch; fourth power of nearness
-  double tip_floor_mm = 0.05;      ///< least deviation of the tip's displacement
+  double point_px = 0.07;        ///< deviation of a tracked point in one camera, px
+  double point_dof = 4;          ///< Student-t degrees of freedom of a point
+  double effective_points = 25;  ///< effective sample size: more points share their errors with neighbours
+  double motion_error = 0.06;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
+  double tip_floor_mm = 0.05;    ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
   double excluded_radii = 1.2;     ///< points nearer to a patch than so many radii are left out
@@ -24,8 +22,9 @@ struct InferenceParameters {
   double disparity_bias_px = 0.05;                  ///< common to all points of a frame
   double hand_mm_per_s = 40;                        ///< speed of a hand: walk of the patch, and of a free tip
   double log_radius = 0.7;                          ///< of the patch's radius: a factor of two
-  double stated_radius = 0.1;                       ///< the same where the stated one is right (Cauchy)
-  double tissue_radius = 0.05;  ///< of the log radius that the tissue tells: the model's error far from the patch
+  double stated_radius = 0.1;                       ///< the same where the stated one is right
+  double stated_right = 0.7;                        ///< probability that it is
+  double tissue_radius = 0.15;  ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
@@ -54,6 +53,10 @@ struct InferenceParameters {
   double settling_s = 0.15;                    ///< after onset the tip's place against the patch is told by the tissue
   double unexplained_deviations = 6;           ///< a point farther from its prediction is not explained
   double unexplained_ratio = 0.6;              ///< more of them than this: no hypothesis explains the frame
+
+  double min_points_obscured = 0.6;  ///< fraction of the points below which an obscured picture shows nothing
+  double min_points = 0.25;          ///< and a clear one another scene
+  double telling_deviation = 0.4;    ///< a hidden tip's force is told where its deviation is below this ratio of it
 
   // The band.
   double model_error = 0.03;  ///< of the force, ratio to it: what the model's form leaves

@@ -23,20 +23,6 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
   return sum;
 }
 
-/// Ratio of the error of the model's motion of a point to that motion. Near a patch the tissue answers as a half-space
-/// would; as far from it as its attachments are, all that is not known of the body counts (Saint-Venant); at its rim,
-/// what is not known of the patch.
-double motion_error(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
-  double far = std::numeric_limits<double>::infinity(), rim = 0;
-  if (!body.patches || body.patches->empty()) return parameters.motion_error;
-  for (const PatchReach& patch : *body.patches) {
-    const double distance_mm = (point.rest_mm - patch.center_mm).norm();
-    far = std::min(far, std::pow(distance_mm / patch.attachments_mm, 2));
-    rim = std::max(rim, std::pow(2 * patch.rim_mm / distance_mm, 4));
-  }
-  return std::hypot(parameters.motion_error, parameters.far_motion_error * far, parameters.rim_motion_error * rim);
-}
-
 /// dx/d(unknowns) of the point of the body now at R (X + u - about), for a displacement with these derivatives.
 void fill_scene_columns(const Vec3& turned_mm, const Mat3& A, decltype(Measurement::H)& H) {
   H.middleCols<3>(Unknowns::kTranslation) = A;
@@ -71,7 +57,15 @@ std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, cons
 }
 
 double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters) {
-  return motion_error(point, body, parameters) * body.displacement_mm(point).norm();
+  if (!body.response || !body.patches) return parameters.motion_error * body.displacement_mm(point).norm();
+  const Belief at{body.x0, {}};
+  double error2_mm2 = 0;
+  for (size_t k = 0; k < body.patches->size(); ++k) {
+    const PatchReach& patch = (*body.patches)[k];
+    const double decay = std::min(1.0, patch.radius_mm / (point.rest_mm - patch.center_mm).norm());
+    error2_mm2 += std::pow(parameters.motion_error * at.q_mm(k).norm() * decay, 2);
+  }
+  return std::sqrt(error2_mm2);
 }
 
 Vec3 PredictedBody::displacement_mm(const TissuePoint& point) const {

@@ -20,11 +20,11 @@ struct SurfacePlace {
 std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, const std::vector<Vec3>& nodes_mm,
                                     const std::vector<Triangle>& boundary);
 
-/// How near to a patch, and how far from it, the model of its motion is right.
+/// How near to a patch the model of its motion is right.
 struct PatchReach {
   Vec3 center_mm = Vec3::Zero();  ///< at rest
-  double rim_mm = 0;              ///< radius of the patch, the smallest that is likely
-  double attachments_mm = 0;      ///< how far they are
+  double radius_mm = 0;           ///< of the patch
+  double rim_mm = 0;              ///< the smallest that is likely
 };
 
 /// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.
@@ -47,7 +47,8 @@ struct StereoProjection {
 };
 StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm);
 
-/// Error of where the model says that a point is, mm.
+/// Error of where the model says that a point is, mm: a ratio of how far a half-space would move it, |q| r / distance.
+/// What is not known of the body (Saint-Venant) moves far tissue about as much as near, where Eq. 3 nearly cancels.
 double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters);
 
 /// Tissue points in both cameras: z = pi(S (X + u)) - pi(X) + bias, px.

@@ -9,6 +9,8 @@ namespace {
 
 /// A patch whose radius has changed by this ratio is laid anew.
 constexpr double kRadiusChange = 0.08;
+/// Probability of a slide from which on the radius is kept.
+constexpr double kMaySlide = 0.05;
 /// A slid patch is laid anew when it stands so many radii from its place.
 constexpr double kSlideReach_radii = 0.4;
 
@@ -22,7 +24,9 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Cont
   // Learned without the operator's word, which each fit hears anew; the patch is laid as it is believed with it.
   double& learned = belief.mean[Unknowns::log_radius(k)];
   double log_radius = fit.posterior.log_radius(k);
-  if (force.force_N.norm() < parameters.telling_force * deviation_N) {
+  // Nor does tissue that a tip may have begun to slide over.
+  if (force.force_N.norm() < parameters.telling_force * deviation_N ||
+      hand.filter.probability(Hold::slide) > kMaySlide) {
     forget(prior, Unknowns::log_radius(k), 1, belief);
     return;
   }

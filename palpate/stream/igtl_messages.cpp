@@ -8,6 +8,7 @@
 #include <igtlTransformMessage.h>
 #include <igtlUnit.h>
 
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/stream/clock.h"

@@ -75,7 +75,8 @@ std::vector<std::string> names() {
   return names;
 }
 
-INSTANTIATE_TEST_SUITE_P(Readers, Corpus, ::testing::ValuesIn(names()), [](const auto& info) { return info.param; });
+INSTANTIATE_TEST_SUITE_P(Readers, Corpus, ::testing::ValuesIn(names()),
+                         [](const auto& target) { return target.param; });
 
 }  // namespace
 }  // namespace palpate::fuzz

@@ -51,6 +51,24 @@ TEST(Measurement, TheDerivativesByTheScenesMotionAreThoseOfFiniteDifferences) {
   }
 }
 
+TEST(Measurement, TheModelErrsByARatioOfWhatAHalfSpaceWouldDo) {
+  const InferenceParameters parameters;
+  ContactResponse response;
+  const std::vector<SurfacePlace> places(1);
+  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3, 2.5}};
+  Eigen::VectorXd x0 = Eigen::VectorXd::Zero(Unknowns::count(1));
+  x0.segment<3>(Unknowns::q(0)) << 0, 3, 4;
+  const PredictedBody body{&response, &places, x0, Vec3::Zero(), &patches};
+  const auto error_mm = [&](double distance_mm) {
+    TissuePoint point;
+    point.rest_mm = {distance_mm, 0, 90};
+    return model_error_mm(point, body, parameters);
+  };
+  EXPECT_NEAR(error_mm(2), 5 * parameters.motion_error, 1e-12);
+  EXPECT_NEAR(error_mm(6), 2.5 * parameters.motion_error, 1e-12);
+  EXPECT_NEAR(error_mm(30), 0.5 * parameters.motion_error, 1e-12);
+}
+
 TEST(Measurement, ATipIsLessSureAlongTheViewingRay) {
   const InferenceParameters parameters;
   const Rectification rig = turned_rig();

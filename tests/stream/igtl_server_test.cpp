@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "palpate/core/errors.h"
+#include "palpate/stream/address.h"
 #include "palpate/stream/clock.h"
 #include "tests/stream/other_program.h"
 #include "tests/stream/samples.h"
