@@ -10,7 +10,7 @@ struct InferenceParameters {
   double point_px = 0.07;        ///< deviation of a tracked point in one camera, px
   double point_dof = 4;          ///< Student-t degrees of freedom of a point
   double effective_points = 25;  ///< effective sample size: more points share their errors with neighbours
-  double motion_error = 0.06;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
+  double motion_error = 0.08;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
   double tip_floor_mm = 0.05;    ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
@@ -24,7 +24,7 @@ struct InferenceParameters {
   double log_radius = 0.7;                          ///< of the patch's radius: a factor of two
   double stated_radius = 0.1;                       ///< the same where the stated one is right
   double stated_right = 0.7;                        ///< probability that it is
-  double tissue_radius = 0.15;  ///< of the log radius that the tissue tells: the model's error far from the patch
+  double tissue_radius = 0.1;  ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
