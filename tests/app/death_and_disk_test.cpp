@@ -121,8 +121,9 @@ TEST_F(Estimate, ASecondRunIntoAFolderLeavesItsOwnFilesOnly) {
     names.insert(entry.path().filename().string());
     EXPECT_EQ(read_file(entry.path()) == "of an earlier run", entry.path().filename() == "notes.txt") << entry.path();
   }
-  EXPECT_EQ(names, (std::set<std::string>{"forces.csv", "overlay.mp4", "report.html", "run.yaml", "map.vtu",
-                                          "surface.ply", "cloud.ply", "preview.png", "map.json", "notes.txt"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"forces.csv", "overlay.mp4", "report.html", "run.yaml", "map.vtu", "surface.ply",
+                                   "cloud.ply", "preview.png", "confidence.png", "map.json", "notes.txt"}));
   EXPECT_EQ(count_lines(output / "forces.csv"), kFrames + 1);
 }
 
