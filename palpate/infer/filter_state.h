@@ -78,7 +78,8 @@ struct FilterState {
                    ContactFit& tied);
 
   // renew_patch.cpp: radius and place of the patch
-  /// Radius and place of the patch as believed by now. A weak force says nothing of the radius.
+  /// Radius and place of the patch as believed by now. A weak force, or tissue that a tip may slide over, says nothing
+  /// of the radius.
   void renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit);
 
   // answer.cpp: what is told of a frame
@@ -88,6 +89,8 @@ struct FilterState {
   double misfit_mm(const FrameData& data, const Belief& at, bool& explained) const;
 
  private:
+  /// The patch where the tip has slid to.
+  void follow_slide(size_t instrument);
   Gap gap_of(const Vec3& tip_in_map_mm) const;
   Vec3 place_at_rest(const Gap& gap) const;
   ContactPrior prior_of_touch() const;

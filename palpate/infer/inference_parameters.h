@@ -23,12 +23,12 @@ struct InferenceParameters {
   double hand_mm_per_s = 40;                        ///< speed of a hand: walk of the patch, and of a free tip
   double log_radius = 0.7;                          ///< of the patch's radius: a factor of two
   double stated_radius = 0.1;                       ///< the same where the stated one is right
-  double stated_right = 0.7;                        ///< probability that it is
+  double stated_right = 0.5;                        ///< probability that it is
   double tissue_radius = 0.1;  ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
-  double skew = 0.05;                                   ///< common error of the model's motion of all tissue, ratio
+  double skew = 0.02;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
 

@@ -16,37 +16,36 @@ constexpr double kSlideReach_radii = 0.4;
 
 }  // namespace
 
-void FilterState::renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit) {
+void FilterState::follow_slide(size_t instrument) {
   Hand& hand = hands[instrument];
   const size_t k = *hand.contact;
+  const Vec3 normal = model.footprint(k).normal;
+  Vec3 slid_mm = belief.offset_mm(k) - hand.slid_from_mm;
+  slid_mm -= slid_mm.dot(normal) * normal;
+  if (slid_mm.norm() <= kSlideReach_radii * model.radius_mm(k)) return;
+  const Vec3 from_mm = model.footprint(k).center_mm;
+  model.move(k, from_mm + slid_mm);
+  belief.mean.segment<3>(Unknowns::offset(k)) -= model.footprint(k).center_mm - from_mm;
+  hand.slid_from_mm = belief.offset_mm(k);
+  solve_anew();
+}
+
+void FilterState::renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit) {
+  const HoldFilter& filter = hands[instrument].filter;
+  const size_t k = *hands[instrument].contact;
   const ForceAt force = force_at(*body, fit.posterior, k);
   const double deviation_N = std::sqrt(force_covariance(force, fit).trace() / 3);
-  // Learned without the operator's word, which each fit hears anew; the patch is laid as it is believed with it.
-  double& learned = belief.mean[Unknowns::log_radius(k)];
-  double log_radius = fit.posterior.log_radius(k);
-  // Nor does tissue that a tip may have begun to slide over.
-  if (force.force_N.norm() < parameters.telling_force * deviation_N ||
-      hand.filter.probability(Hold::slide) > kMaySlide) {
+  const bool tells_radius =
+      force.force_N.norm() >= parameters.telling_force * deviation_N && filter.probability(Hold::slide) <= kMaySlide;
+  if (!tells_radius) {
     forget(prior, Unknowns::log_radius(k), 1, belief);
+    if (filter.most_probable() == Hold::slide) follow_slide(instrument);
     return;
   }
-  learned = std::clamp(learned, stated_log_radius() + std::log(parameters.min_radius_ratio),
-                       stated_log_radius() + std::log(parameters.max_radius_ratio));
+  // Laid as the tissue says, without the operator's word, so that what the tissue says next is right to first order.
+  double& log_radius = belief.mean[Unknowns::log_radius(k)];
   log_radius = std::clamp(log_radius, stated_log_radius() + std::log(parameters.min_radius_ratio),
                           stated_log_radius() + std::log(parameters.max_radius_ratio));
-  if (hand.filter.most_probable() == Hold::slide) {
-    const Vec3 normal = model.footprint(k).normal;
-    Vec3 slid_mm = belief.offset_mm(k) - hand.slid_from_mm;
-    slid_mm -= slid_mm.dot(normal) * normal;
-    if (slid_mm.norm() > kSlideReach_radii * std::exp(log_radius)) {
-      const Vec3 from_mm = model.footprint(k).center_mm;
-      model.move(k, from_mm + slid_mm);
-      belief.mean.segment<3>(Unknowns::offset(k)) -= model.footprint(k).center_mm - from_mm;
-      hand.slid_from_mm = belief.offset_mm(k);
-      solve_anew();
-      return;
-    }
-  }
   if (std::abs(log_radius - std::log(model.radius_mm(k))) > kRadiusChange) {
     const std::optional<Equilibrium> equilibrium = model.set_radius(k, std::exp(log_radius), body->q_mm);
     if (!equilibrium) return;
