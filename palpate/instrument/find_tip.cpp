@@ -34,15 +34,20 @@ struct Picture {
 };
 
 constexpr int kLeastPixels = 60;
-constexpr double kApartWidths = 2;      // between the places where two shafts enter
-constexpr double kShaftShare = 0.5;     // of the full width that a slice of the shaft has
-constexpr double kSleeveShare = 0.8;    // the same where a thin rod comes out of a sleeve
-constexpr double kSolid = 0.85;         // share of a slice of the shaft that belongs to the mask
-constexpr double kStraight = 0.14;      // deviation of a shaft's edges from straight lines, in its widths
-constexpr double kVeryStraight = 0.09;  // the same of a mask that nothing but colours has made
-constexpr double kGapWidths = 3;        // between the border and what is seen of an instrument whose shaft is too dark
-constexpr double kGapLength = 1.8;      // of such a part, in its widths
-constexpr double kRearEnd = 0.06;       // of its length
+constexpr double kApartWidths = 2;    // between the places where two shafts enter
+constexpr double kShaftShare = 0.5;   // of the full width that a slice of the shaft has
+constexpr double kSleeveShare = 0.8;  // the same where a thin rod comes out of a sleeve
+constexpr double kSolid = 0.85;       // share of a slice of the shaft that belongs to the mask
+/// What a part may look like, to be an instrument.
+struct ShaftShape {
+  double straight;  ///< most deviation of the edges from straight lines, in widths
+  double taper;     ///< most that they come together, per length
+};
+constexpr ShaftShape kVetted{0.3, 1.2};       // of a mask whose parts are instruments: near ones taper, wrists bend
+constexpr ShaftShape kByColours{0.09, 0.45};  // of a mask that nothing but colours has made
+constexpr double kGapWidths = 3;    // between the border and what is seen of an instrument whose shaft is too dark
+constexpr double kGapLength = 1.8;  // of such a part, in its widths
+constexpr double kRearEnd = 0.06;   // of its length
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -154,12 +159,12 @@ Shaft fit_shaft(const std::vector<Slice>& slices, double least_share) {
   return shaft;
 }
 
-bool looks_like_an_instrument(const Shaft& shaft, double length, double straight) {
+bool looks_like_an_instrument(const Shaft& shaft, double length, const ShaftShape& shape) {
   const double width = shaft.width;
   if (width < 3 || shaft.slices < 0.6 * width || length < 1.3 * width) return false;
-  const double straightness = std::max(1.5, straight * width);
+  const double straightness = std::max(1.5, shape.straight * width);
   return shaft.low.deviation < straightness && shaft.high.deviation < straightness &&
-         std::abs(shaft.high.slope - shaft.low.slope) < 0.45 && shaft.filled > 0.6;
+         std::abs(shaft.high.slope - shaft.low.slope) < shape.taper && shaft.filled > 0.6;
 }
 
 /// Whether what is thinner than the sleeve comes straight out of its end.
@@ -260,7 +265,7 @@ std::vector<cv::Point> rear_end(const std::vector<cv::Point>& pixels, const cv::
 }
 
 std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, const cv::Mat& border,
-                                         const cv::Point& origin, const Picture& picture, double straight) {
+                                         const cv::Point& origin, const Picture& picture, const ShaftShape& shape) {
   cv::Point2d entry(0, 0);
   std::vector<cv::Point> entering;
   for (const cv::Point& p : pixels)
@@ -292,11 +297,11 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest, straight)) {
+  if (!looks_like_an_instrument(shaft, farthest, shape)) {
     shaft = fit_shaft(slices, kSleeveShare);
     if (!has_rod(slices, shaft)) return {};
   }
-  if (!looks_like_an_instrument(shaft, farthest, straight) || at_two_places(entering, shaft.width)) return {};
+  if (!looks_like_an_instrument(shaft, farthest, shape) || at_two_places(entering, shaft.width)) return {};
 
   const cv::Point2d end = far_end(slices, first, shaft.width);
   ImageTip tip;
@@ -307,7 +312,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
 }
 
 std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t most,
-                                            double straight) {
+                                            const ShaftShape& shape) {
   std::vector<ImageInstrument> found;
   const cv::Rect box = cv::boundingRect(instrument_mask);
   if (box.area() < kLeastPixels) return found;
@@ -326,7 +331,7 @@ std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, cons
     cv::findNonZero(part, pixels);
     const bool from_image_border = touches(pixels, border) || picture_area.empty();
     if (auto tip = tip_of_component(pixels, from_image_border ? border : picture_border(picture_area, box), box.tl(),
-                                    {instrument_mask.size(), picture_area}, straight)) {
+                                    {instrument_mask.size(), picture_area}, shape)) {
       tip->tip_px += cv::Point2d(box.tl());
       found.push_back({*tip, box, part});
     }
@@ -338,11 +343,11 @@ std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, cons
 
 std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
                                               size_t most) {
-  return instruments_in(instrument_mask, picture_area, most, kStraight);
+  return instruments_in(instrument_mask, picture_area, most, kVetted);
 }
 
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {
-  const std::vector<ImageInstrument> found = instruments_in(instrument_mask, picture_area, 1, kVeryStraight);
+  const std::vector<ImageInstrument> found = instruments_in(instrument_mask, picture_area, 1, kByColours);
   if (found.empty()) return {};
   return found[0].tip;
 }
