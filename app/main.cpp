@@ -7,9 +7,9 @@
 #include "app/answer.h"
 #include "app/document_inputs.h"
 #include "app/runtime.h"
-#include "app/scene_file.h"
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
+#include "palpate/session/scene_file.h"
 
 namespace {
 
@@ -51,12 +51,12 @@ int main(int argc, char** argv) {
   app::add_check(program);
   app::add_modulus(program);
   app::add_study(program);
-  app::add_later_verbs(program);
+  app::add_console(program);
 
   try {
     program.parse(argc, argv);
     if (document_scene) {
-      fmt::print("{}", app::document_scene_file());
+      fmt::print("{}", document_scene_file());
     } else if (document_inputs) {
       fmt::print("{}", app::document_inputs());
     } else if (program.get_subcommands().empty()) {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "app/scene_file.h"
 #include "palpate/feedback/forces_file.h"
+#include "palpate/session/scene_file.h"
 
 namespace palpate::app {
 

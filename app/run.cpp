@@ -4,68 +4,20 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "app/answer.h"
-#include "app/clear_results.h"
-#include "app/output_folder.h"
-#include "app/playback.h"
 #include "app/progress.h"
-#include "app/recording_check.h"
-#include "app/run_files.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
-#include "palpate/core/mesh_files.h"
 #include "palpate/core/stopwatch.h"
-#include "palpate/core/whole_file.h"
-#include "palpate/estimate/force_estimator.h"
-#include "palpate/feedback/map_confidence.h"
-#include "palpate/feedback/map_json.h"
-#include "palpate/feedback/map_preview.h"
 #include "palpate/feedback/quantile.h"
 #include "palpate/feedback/warnings.h"
-#include "palpate/instrument/tip_track.h"
-#include "palpate/stream/stream_hub.h"
-#include "palpate/volume/body_remarks.h"
+#include "palpate/session/output_folder.h"
+#include "palpate/session/run.h"
 
 namespace palpate::app {
 
 namespace {
-
-/// Outlines may run along the border of the image, not mostly outside.
-constexpr double kLeastShareInImage = 0.5;
-
-/// Runs a stage that knows no scene file; what it finds bad is told with the file, and with `key` where its sentence
-/// does not begin with one.
-template <class Stage>
-auto in_scene(const SceneFile& scene_file, const std::string& key, const Stage& stage) {
-  try {
-    return stage();
-  } catch (const BadInput& error) {
-    const std::string sentence = error.what();
-    const auto names = [&sentence](const char* group) { return sentence.starts_with(group); };
-    const bool names_key = names("recording") || names("map.") || names("attachments") || names("instrument") ||
-                           names("contact.") || names("uncertainty") || names("streams");
-    const std::filesystem::path& volume = scene_file.scene.map.volume;
-    const std::string told = names_key                                                  ? ""
-                             : !volume.empty() && sentence.starts_with(volume.string()) ? "map.volume: "
-                                                                                        : key + ": ";
-    throw BadInput(fmt::format("{}: {}{}", scene_file.file.string(), told, sentence));
-  }
-}
-
-/// A region drawn in a picture of another size selects the wrong tissue, or none.
-void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size size) {
-  if (region_px.empty()) return;
-  const std::vector<cv::Point2f> corners(region_px.begin(), region_px.end());
-  const cv::Rect2f around = cv::boundingRect(corners), image({0, 0}, cv::Size2f(size));
-  if ((around & image).area() >= kLeastShareInImage * around.area()) return;
-  throw BadInput(fmt::format(
-      "map.organ_region_px reaches from ({:g}, {:g}) to ({:g}, {:g}), expected corners inside the left image of {}x{} "
-      "px",
-      around.tl().x, around.tl().y, around.br().x - 1, around.br().y - 1, size.width, size.height));
-}
 
 FrameTimes median_stages(const std::vector<FrameTimes>& times, const std::vector<ForceRow>& rows) {
   const bool any_contact = std::any_of(rows.begin(), rows.end(), [](const ForceRow& row) { return row.in_contact; });
@@ -125,91 +77,15 @@ std::string text_of_comparison(const Comparison& c) {
   return text;
 }
 
-ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built, const StreamHub* streams = nullptr) {
-  const Scene& scene = scene_file.scene;
-  InstrumentOptions instrument = scene.instrument;
-  if (streams) instrument.live_tip = streams->live_tip();
-  ForceUncertainty uncertainty = in_scene(scene_file, "uncertainty", [&] {
-    return force_uncertainty(built.map, built.rectification, scene.map, scene.uncertainty,
-                             scene.contact.footprint_radius_mm);
-  });
-  return in_scene(scene_file, "contact", [&] {
-    return ForceEstimator(built.map, built.frame, built.rectification, instrument, scene.contact, scene.tuning,
-                          std::move(uncertainty));
-  });
-}
-
 }  // namespace
 
 BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
-  const Scene& scene = scene_file.scene;
-  const auto opened = [&](const std::string& key, const auto& stage) { return in_scene(scene_file, key, stage); };
-  Recording recording = opened("recording", [&] { return Recording(scene.recording); });
-  const StereoRig rig = opened("recording.calibration", [&] {
-    StereoRig read = read_rig(scene.recording);
-    check_rig_fits(read, recording.size());
-    return read;
-  });
-  if (!scene.instrument.track.empty() && !scene.instrument.has_live_track())
-    opened("instrument.track", [&] { return read_tip_track(scene.instrument.track); });
-  if (!quiet) fmt::print(stderr, "calibration {}\n", describe_rig(rig, recording.size()));
-  BuiltMap built;
-  built.timing = recording.timing();
-  built.notes = recording.notes();
-  built.notes.insert(built.notes.end(), rig.notes.begin(), rig.notes.end());
-  if (!scene.map.volume.empty()) {
-    const auto remarks = opened("map.volume", [&] { return body_remarks(scene.map.volume); });
-    built.notes.insert(built.notes.end(), remarks.begin(), remarks.end());
-  }
-  if (!quiet) fmt::print(stderr, "{}", describe_input(built.timing, built.notes));
-  built.fps = recording.fps();
-  built.frame_count = recording.frame_count();
-  built.rectification = make_rectification(rig, recording.size());
-  opened("map", [&] {
-    require_region_in_image(scene.map.organ_region_px, recording.size());
-    std::optional<StereoFrame> frame = recording.next();
-    std::vector<StereoFrame> static_frames;
-    while (frame && frame->index < scene.map.frame) {
-      if (frame->index >= scene.map.first_frame() && !frame->right.empty()) static_frames.push_back(*frame);
-      frame = recording.next();
-    }
-    if (!frame)
-      throw BadInput(
-          fmt::format("map.frame is {}, but the recording has only {} frames", scene.map.frame, built.frame_count));
-    if (frame->right.empty())
-      throw BadInput(
-          fmt::format("map.frame is {}, but the right camera shows nothing of that time, expected a frame that "
-                      "both have",
-                      scene.map.frame));
-    built.frame = *frame;
-    static_frames.push_back(built.frame);
-    built.map = build_tissue_map(static_frames, built.rectification, scene.map, scene.tissue, scene.attachments);
-  });
+  BuildWatch watch;
   if (!quiet)
-    for (const std::string& warning : built.map.disparity.warnings) fmt::print(stderr, "warning     {}\n", warning);
-  return built;
-}
-
-void write_map_files(const BuiltMap& built, const std::filesystem::path& folder) {
-  const TissueMap& map = built.map;
-  MeshArrays arrays;
-  arrays.node_scalars["fixed"].assign(map.mesh.nodes_mm.size(), 0.0);
-  for (int node : map.fixed_nodes) arrays.node_scalars["fixed"][static_cast<size_t>(node)] = 1;
-  Losses losses;
-  losses.attempt([&] { write_vtu(folder / "map.vtu", map.mesh, arrays); });
-  losses.attempt([&] { write_ply(folder / "surface.ply", map.surface); });
-  losses.attempt([&] { write_ply(folder / "cloud.ply", map.cloud); });
-  losses.attempt([&] { write_whole_file(folder / "map.json", map_json(map, built.rectification)); });
-  const auto write_picture = [&](const std::string& name, const cv::Mat& picture) {
-    losses.attempt([&] {
-      std::vector<unsigned char> png;
-      cv::imencode(".png", picture, png);
-      write_whole_file(folder / name, {reinterpret_cast<const char*>(png.data()), png.size()});
-    });
-  };
-  write_picture("preview.png", draw_map_preview(built.frame.left, built.rectification, map));
-  write_picture("confidence.png", draw_map_confidence(built.frame.left, built.rectification, map));
-  if (losses.any()) throw Unfinished(losses.text());
+    watch.told = [](const std::string& what, const std::string& sentence) {
+      fmt::print(stderr, "{:<12}{}\n", what, sentence);
+    };
+  return palpate::build_map(scene_file, watch);
 }
 
 std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
@@ -236,41 +112,26 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
     fmt::print(stderr, "map         {} tetrahedra, {} attached nodes, {} points, {:.2f} s\n",
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
 
-  const Scene& scene = scene_file.scene;
-  StreamHub streams = in_scene(scene_file, "streams", [&] {
-    const StreamScene live = stream_scene(built.map, built.rectification.rig, built.fps, scene.contact.friction);
-    return StreamHub(scene_file.streams, live, scene.instrument);
-  });
+  Run run(scene_file, built, options.folder, std::move(truths),
+          {options.realtime, [] { return interrupted().load(); }});
   if (!options.quiet)
-    for (const std::string& note : streams.notes()) fmt::print(stderr, "streams     {}\n", note);
-  ForceEstimator estimator = make_estimator(scene_file, built, &streams);
-  Recording recording(scene.recording);
-  Playback playback(recording, options.realtime);
-  begin_results(options.folder);
-  RunFiles files(scene_file, options.folder, built, recording, std::move(truths), streams);
-  files.losses.attempt([&] { write_map_files(built, options.folder); });
-  const auto loop = [&] {
+    for (const std::string& note : run.streams().notes()) fmt::print(stderr, "streams     {}\n", note);
+  {
     Progress progress("estimate", options.quiet);
-    while (const auto played = playback.next()) {
-      const ForceEstimate estimate = played->passed_over ? passed_over(played->frame) : estimator.update(played->frame);
-      files.add(*played, estimate);
-      progress.show(
-          played->frame.index + 1, recording.frame_count(),
-          fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), force_unit(scene.tissue)));
-      if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", played->frame.index));
+    const std::string unit = force_unit(scene_file.scene.tissue);
+    while (const auto shown = run.next()) {
+      const ForceEstimate& estimate = shown->estimate;
+      progress.show(estimate.frame + 1, run.frame_count(),
+                    fmt::format("{} {:.3g} {}", status_name(estimate.status), estimate.force_N.norm(), unit));
     }
-  };
-  try {
-    files.losses.attempt(loop);
-  } catch (const BadInput& reason) {  // an image in the middle that does not open
-    files.losses.add(reason.what());
   }
-  files.close();
+  run.close();
+  const RunFiles& files = run.files();
   if (files.losses.any())
     throw Unfinished(
         fmt::format("{}; {} frames are kept in {}", files.losses.text(), files.rows.size(), options.folder.string()));
   RunSummary summary = summary_of(files, map_s);
-  summary.streams = streams.summary();
+  summary.streams = run.streams().summary();
   return summary;
 }
 

@@ -5,8 +5,9 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 
-#include "app/scene_file.h"
 #include "palpate/feedback/compare.h"
+#include "palpate/session/built_map.h"
+#include "palpate/session/scene_file.h"
 
 namespace palpate::app {
 
@@ -37,23 +38,8 @@ struct RunSummary {
   std::vector<std::string> streams;  ///< what was sent, a line for each stream
 };
 
-/// A map, and the frame and recording it was built from.
-struct BuiltMap {
-  double fps = 0;
-  int frame_count = -1;  ///< -1 = unknown
-  RecordingTiming timing;
-  std::vector<std::string> notes;  ///< sentences on recording and calibration that a user ought to know
-  StereoFrame frame;
-  Rectification rectification;
-  TissueMap map;
-};
-
-/// The build stage of a scene: opens all that the scene names, reads up to the map frame, builds. Throws BadInput with
-/// a sentence that names the scene file, Unfinished.
+/// The build stage of a scene; what is found on the way goes to standard error. Throws BadInput, Unfinished.
 BuiltMap build_map(const SceneFile& scene_file, bool quiet);
-
-/// map.vtu, surface.ply, cloud.ply, preview.png, map.json.
-void write_map_files(const BuiltMap& built, const std::filesystem::path& folder);
 
 /// Both stages of a scene, with every file of the contract. Nothing is written before the map stands. Throws BadInput;
 /// throws Unfinished when the recording ends early or spoils on the way or the user interrupts, with all rows and

@@ -1,10 +1,10 @@
 #include "app/simulation.h"
 
-#include "app/clear_results.h"
 #include "app/progress.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/whole_file.h"
+#include "palpate/session/clear_results.h"
 #include "palpate/simulate/uterus_demo.h"
 
 namespace palpate::app {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "app/scene_file.h"
+#include "palpate/session/scene_file.h"
 #include "palpate/simulate/dejavu.h"
 
 namespace palpate::app {

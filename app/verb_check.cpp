@@ -6,11 +6,11 @@
 
 #include "app/answer.h"
 #include "app/check_pictures.h"
-#include "app/output_folder.h"
 #include "app/recording_check.h"
 #include "app/run.h"
 #include "app/track_check.h"
 #include "app/verbs.h"
+#include "palpate/session/output_folder.h"
 
 namespace palpate::app {
 

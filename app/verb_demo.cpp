@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
-#include "app/output_folder.h"
 #include "app/run.h"
 #include "app/simulation.h"
 #include "app/verbs.h"
+#include "palpate/session/output_folder.h"
 
 namespace palpate::app {
 

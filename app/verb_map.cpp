@@ -4,11 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
-#include "app/clear_results.h"
-#include "app/output_folder.h"
 #include "app/run.h"
 #include "app/verbs.h"
 #include "palpate/feedback/map_json.h"
+#include "palpate/session/clear_results.h"
+#include "palpate/session/output_folder.h"
 
 namespace palpate::app {
 

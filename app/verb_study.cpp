@@ -6,13 +6,13 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
-#include "app/output_folder.h"
 #include "app/progress.h"
 #include "app/study_jobs.h"
 #include "app/study_page.h"
 #include "app/study_run.h"
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
+#include "palpate/session/output_folder.h"
 
 namespace palpate::app {
 

@@ -25,6 +25,6 @@ void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_modulus(CLI::App& app);
 void add_study(CLI::App& app);
-void add_later_verbs(CLI::App& app);
+void add_console(CLI::App& app);
 
 }  // namespace palpate::app

@@ -39,7 +39,7 @@ std::optional<Measured> measure(const Sequence& sequence, const std::vector<Scen
   try {
     save_scene(changed(sequence.scene, changes), folder / "scene.yaml");
     const app::RunSummary summary =
-        app::run_estimate(app::read_scene_file(folder / "scene.yaml", true), {folder, sequence.truth, true});
+        app::run_estimate(read_scene_file(folder / "scene.yaml", true), {folder, sequence.truth, true});
     Measured measured;
     measured.figures = summary.comparison.value();
     measured.second = summary.comparison_2;

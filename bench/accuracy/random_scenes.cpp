@@ -161,9 +161,9 @@ SimulatedLook draw_look(Dice& dice) {
 
 }  // namespace
 
-app::SceneFile random_scene(int number, int attempt) {
+SceneFile random_scene(int number, int attempt) {
   Dice dice(number, attempt);
-  app::SceneFile scene_file;
+  SceneFile scene_file;
   scene_file.file = fmt::format("random_{:02d}.yaml", number);
   scene_file.has_simulate = true;
   SimulateOptions& simulate = scene_file.simulate;
@@ -197,7 +197,7 @@ app::SceneFile random_scene(int number, int attempt) {
   return scene_file;
 }
 
-std::string describe_random_scene(const app::SceneFile& scene_file) {
+std::string describe_random_scene(const SceneFile& scene_file) {
   const SimulateOptions& simulate = scene_file.simulate;
   const std::vector<GestureRow>& rows = simulate.gesture;
   const bool push = is_push(rows);

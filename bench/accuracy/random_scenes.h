@@ -1,6 +1,6 @@
 #pragma once
 
-#include "app/scene_file.h"
+#include "palpate/session/scene_file.h"
 
 namespace palpate {
 
@@ -9,9 +9,9 @@ namespace palpate {
 /// heartbeat of 0 to 3 mm beneath a hand that stands. In every third scene the instrument grasps and the truth is not
 /// the estimator's model: an ellipse, a soft rim or two jaws, on four times as many elements. 70 to 90 frames.
 /// `attempt`: a scene may miss its organ or have no equilibrium; the next attempt draws other numbers.
-app::SceneFile random_scene(int number, int attempt = 0);
+SceneFile random_scene(int number, int attempt = 0);
 
 /// "pear, neo-hookean, 21 kPa, 3.4 mm, slide, moves 2.1 mm, two_jaws".
-std::string describe_random_scene(const app::SceneFile& scene);
+std::string describe_random_scene(const SceneFile& scene);
 
 }  // namespace palpate

@@ -122,10 +122,9 @@ int main(int argc, char** argv) {
       if (!drive.empty()) changes.push_back({"contact.drive", YAML::Node(drive)});
       const std::filesystem::path results =
           folder / "runs" / fmt::format("scene_{:02d}{}{}", number, drive.empty() ? "" : "_", drive);
-      all.push_back(
-          {number,
-           describe_random_scene(app::read_scene_file(folder / "scenes" / sequence.name / "made_of.yaml", false)),
-           measure(sequence, changes, results)});
+      all.push_back({number,
+                     describe_random_scene(read_scene_file(folder / "scenes" / sequence.name / "made_of.yaml", false)),
+                     measure(sequence, changes, results)});
       print_row(all.back());
     }
     if (!all.empty()) print_summary(all);

@@ -35,14 +35,14 @@ Sequence rendered(const std::string& name, const YAML::Node& scene, const std::f
     std::filesystem::remove(folder / kMadeOf);
     save_scene(scene, asked);
     DejaVuSummary summary;
-    app::simulate_into(app::read_scene_file(asked, false), folder, true, summary);
+    app::simulate_into(read_scene_file(asked, false), folder, true, summary);
     std::filesystem::rename(asked, folder / kMadeOf);
   }
   return {name, load_scene(folder / "scene.yaml"), folder / "truth.csv"};
 }
 
-YAML::Node dejavu_text(const app::SceneFile& scene) {
-  const YAML::Node whole = YAML::Load(app::write_scene_file(scene));
+YAML::Node dejavu_text(const SceneFile& scene) {
+  const YAML::Node whole = YAML::Load(write_scene_file(scene));
   std::vector<SceneChange> told;
   for (const char* key : {"simulate", "tissue", "attachments", "map.elements", "contact.footprint_radius_mm",
                           "contact.friction", "contact.grip"})

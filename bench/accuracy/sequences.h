@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "app/scene_file.h"
 #include "bench/accuracy/scene_text.h"
+#include "palpate/session/scene_file.h"
 
 namespace palpate {
 
@@ -26,7 +26,7 @@ Sequence rendered(const std::string& name, const YAML::Node& scene, const std::f
 bool is_rendered(const YAML::Node& scene, const std::filesystem::path& folder);
 
 /// What DejaVu is told of a scene, as text: what changes the recording, and no more.
-YAML::Node dejavu_text(const app::SceneFile& scene);
+YAML::Node dejavu_text(const SceneFile& scene);
 
 /// Names of the static sequences: rendered_uterus, rendered_liver, demo, and those of studies/.
 std::vector<std::string> static_sequences();

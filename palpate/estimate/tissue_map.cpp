@@ -8,6 +8,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
+#include "palpate/estimate/build_stages.h"
 #include "palpate/estimate/check_map.h"
 #include "palpate/estimate/find_edges.h"
 #include "palpate/instrument/instrument_finder.h"
@@ -89,6 +90,12 @@ TissueMap build_tissue_map(const StereoFrame& frame, const Rectification& rectif
 TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const Rectification& rectification,
                            const MapOptions& options, const TissueOptions& tissue,
                            const AttachmentOptions& attachments) {
+  return build_tissue_map(static_frames, rectification, options, tissue, attachments, [](const std::string&) {});
+}
+
+TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const Rectification& rectification,
+                           const MapOptions& options, const TissueOptions& tissue, const AttachmentOptions& attachments,
+                           const OnStage& on_stage) {
   if (static_frames.empty()) throw BadInput("no static frame to build the map from");
   const StereoFrame& frame = static_frames.back();
   TissueMap map;
@@ -102,23 +109,28 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   cv::Mat mask;
   std::vector<DisparityMap> disparities;
   for (const StereoFrame& one : static_frames) {
+    on_stage("rectify");
     pair = rectify(rectification, one);
     mask = tissue_mask(pair, rectification, map.organ_mask);
     map.report.rectify_ms += watch.lap_ms();
+    on_stage("match");
     disparities.push_back(match(pair, rectification, mask, options.match));
     map.report.match_ms += watch.lap_ms();
   }
   map.disparity = disparities.size() == 1 ? disparities.front() : fuse(disparities);
   map.report.match_ms += watch.lap_ms();
 
+  on_stage("triangulate");
   map.cloud = triangulate(map.disparity, rectification, pair.left);
   map.report.triangulate_ms = watch.lap_ms();
 
+  on_stage("edges");
   const cv::Mat covered = map.organ_mask & rectification.valid_left & ~mask;
   const DepthEdges edges = find_edges(map.cloud, rectification, covered, options.edges);
   std::vector<PointCloud> groups = split_at_edges(map.cloud, edges);
   map.report.edges_ms = watch.lap_ms();
 
+  on_stage("surface");
   const double spacing_mm = spacing_for(groups.front(), rectification, options);
   map.pieces = cut_surfaces(std::move(groups), edges, spacing_mm, options.surface);
   map.surface = map.pieces.front().surface;
@@ -128,15 +140,18 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
   Surface body = options.volume.empty() ? close_body(map.surface, options.thickness_mm)
                                         : read_body(options.volume, options.volume_unit);
   if (options.register_volume) {
+    on_stage("register");
     map.report.registration = register_to(map.pieces.front().clean, options, body);
     map.report.register_ms = watch.lap_ms();
   }
   if (!options.volume.empty())
     require_body_where_seen(body, map.disparity, rectification, map.organ_mask, options.volume);
+  on_stage("volume");
   map.mesh =
       tetrahedralize(body, options.elements, focus_of(options, map.surface, rectification.rig), &map.report.mesh);
   map.report.volume_ms = watch.lap_ms();
 
+  on_stage("attachments");
   const auto project_px = [&rectification](const Vec3& point) {
     return project_to_recorded_left(rectification.rig, point);
   };

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <filesystem>
-#include <opencv2/core.hpp>
 #include <string>
+
+#include "tests/support/plane_recording.h"
 
 namespace palpate::test {
 
@@ -15,31 +15,5 @@ struct Outcome {
 /// Runs a program with these arguments (a shell line).
 Outcome run(const std::string& program, const std::string& arguments);
 Outcome run_palpate(const std::string& arguments);
-
-/// A folder of its own for one test, removed at the end.
-class Workspace {
- public:
-  Workspace();
-  ~Workspace();
-  std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
-
- private:
-  std::filesystem::path folder_;
-};
-
-/// A textured plane that leans away from a rectified pair of eyes: 320 x 240, focal 300 px, baseline 5 mm.
-struct PlanePair {
-  cv::Mat left, right;
-};
-PlanePair plane_pair(int frame);
-
-/// left.avi, right.avi (`frames` each), calibration.yaml and scene.yaml in `folder`.
-void write_plane_recording(const std::filesystem::path& folder, int frames);
-
-void write_avi(const std::filesystem::path& file, const std::vector<cv::Mat>& frames);
-void write_file(const std::filesystem::path& file, const std::string& text);
-std::string read_file(const std::filesystem::path& file);
-/// The file with one text replaced by another (which must stand in it).
-void replace_in_file(const std::filesystem::path& file, const std::string& from, const std::string& to);
 
 }  // namespace palpate::test

@@ -36,7 +36,7 @@ TEST(Program, WithoutAVerbItSaysWhatItCanDoAndEndsWithTwo) {
 }
 
 TEST(Program, EveryVerbHasHelpWithAnExample) {
-  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study"}) {
+  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console"}) {
     const Outcome outcome = run_palpate(std::string(verb) + " --help");
     EXPECT_EQ(outcome.exit_code, 0) << verb;
     EXPECT_THAT(outcome.output, HasSubstr("Example: palpate")) << verb;
@@ -46,7 +46,7 @@ TEST(Program, EveryVerbHasHelpWithAnExample) {
 TEST(Program, HelpSaysWhereAPathIsMeant) {
   EXPECT_THAT(run_palpate("estimate --help").output,
               testing::AllOf(HasSubstr("scene SCENE"), HasSubstr("FOLDER"), HasSubstr("--truth FILE")));
-  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study"})
+  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console"})
     EXPECT_THAT(run_palpate(std::string(verb) + " --help").output, testing::Not(HasSubstr("TEXT"))) << verb;
 }
 

@@ -25,7 +25,7 @@ TEST(RandomScenes, MoveInHalfOfThemAndHaveAnotherTruthInAThird) {
   int moving = 0, other_truth = 0, pushes = 0;
   std::set<std::string> shapes;
   for (int number = 1; number <= 40; ++number) {
-    const app::SceneFile scene = random_scene(number);
+    const SceneFile scene = random_scene(number);
     const SimulateOptions& simulate = scene.simulate;
     EXPECT_NO_THROW(check_gesture(simulate.gesture));
     const double frames = gesture_duration_s(simulate.gesture) * simulate.camera.fps;

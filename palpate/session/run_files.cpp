@@ -1,4 +1,4 @@
-#include "app/run_files.h"
+#include "palpate/session/run_files.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include "palpate/core/stopwatch.h"
 #include "palpate/core/whole_file.h"
 
-namespace palpate::app {
+namespace palpate {
 
 namespace {
 
@@ -26,12 +26,6 @@ std::string caption(const ForceEstimate& estimate, const std::string& unit) {
 }
 
 }  // namespace
-
-std::string Losses::text() const {
-  std::string text;
-  for (const std::string& sentence : sentences_) text += (text.empty() ? "" : "; ") + sentence;
-  return text;
-}
 
 Truths read_truths(const std::filesystem::path& truth) {
   if (truth.empty()) return {};
@@ -85,7 +79,7 @@ RunFiles::RunFiles(const SceneFile& s, const std::filesystem::path& f, const Bui
   losses.attempt([&] { overlay.emplace(folder / "overlay.mp4", recording.fps(), recording.size()); });
 }
 
-void RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
+RunFrame RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   Stopwatch watch;
   const cv::Mat picture = painter.paint(played.frame.left, estimate);
   estimate.times.draw_ms = watch.lap_ms();
@@ -98,6 +92,7 @@ void RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   pictures.offer(picture, estimate);
   rows.push_back(to_row(estimate));
   times.push_back(estimate.times);
+  return {std::move(estimate), picture, played.decoded_ns};
 }
 
 void RunFiles::close() {
@@ -119,4 +114,4 @@ void RunFiles::close() {
   losses.attempt([&] { write_report(folder / "report.html", report); });
 }
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-namespace palpate::app {
+namespace palpate {
 
 /// The folder is there afterwards, and holds none of the files that `map`, `estimate` and `demo` write: what an earlier
 /// run left never stands beside what this one writes. Other files stay. Throws Unfinished.
@@ -11,4 +11,4 @@ void begin_results(const std::filesystem::path& folder);
 /// The same for the files of `simulate`; its own input stays.
 void begin_sequence(const std::filesystem::path& folder, const std::filesystem::path& input);
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -8,7 +8,7 @@
 #include "palpate/simulate/simulate_options.h"
 #include "palpate/stream/stream_options.h"
 
-namespace palpate::app {
+namespace palpate {
 
 /// A scene file as the program knows it: what is estimated, what is simulated, how it is shown.
 struct SceneFile {
@@ -37,4 +37,4 @@ std::string write_scene_file(SceneFile scene_file);
 /// docs/scene.md: every key with its default, values and meaning.
 std::string document_scene_file();
 
-}  // namespace palpate::app
+}  // namespace palpate

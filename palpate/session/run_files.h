@@ -1,44 +1,23 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "app/playback.h"
-#include "app/run.h"
-#include "app/scene_file.h"
-#include "palpate/core/errors.h"
 #include "palpate/feedback/forces_file.h"
 #include "palpate/feedback/overlay.h"
 #include "palpate/feedback/report.h"
 #include "palpate/feedback/video_writer.h"
+#include "palpate/session/built_map.h"
+#include "palpate/session/losses.h"
+#include "palpate/session/playback.h"
+#include "palpate/session/scene_file.h"
 #include "palpate/stream/stream_hub.h"
 
-namespace palpate::app {
-
-/// What could not be done, in sentences: work goes on without, and tells of it at its end.
-class Losses {
- public:
-  /// False where `work` throws Unfinished, whose sentence is kept.
-  template <class Work>
-  bool attempt(const Work& work) {
-    try {
-      work();
-      return true;
-    } catch (const Unfinished& reason) {
-      add(reason.what());
-      return false;
-    }
-  }
-  void add(const std::string& sentence) { sentences_.push_back(sentence); }
-  bool any() const { return !sentences_.empty(); }
-  std::string text() const;
-
- private:
-  std::vector<std::string> sentences_;
-};
+namespace palpate {
 
 /// True forces of both instruments, each empty where there are none.
 struct Truths {
@@ -70,6 +49,13 @@ class PictureChoice {
   std::vector<Offered> pictures_;
 };
 
+/// A frame with its answer, as it was written and sent.
+struct RunFrame {
+  ForceEstimate estimate;
+  cv::Mat overlay;         ///< 8-bit BGR, the left image as recorded with stress, force and readings; shared
+  int64_t decoded_ns = 0;  ///< steady clock, when both pictures were there
+};
+
 /// Everything that grows frame by frame, and the page that is made of it at the end, whatever the end is.
 struct RunFiles {
   /// Begins forces.csv, run.yaml and overlay.mp4. Throws Unfinished when there cannot even be a forces.csv.
@@ -78,7 +64,7 @@ struct RunFiles {
 
   /// A row, what is sent live, and a picture where the disk still takes one. Throws Unfinished when it does not take
   /// the row.
-  void add(const PlayedFrame& played, ForceEstimate estimate);
+  RunFrame add(const PlayedFrame& played, ForceEstimate estimate);
 
   /// Ends the video, writes run.yaml and report.html; what fails is among the losses.
   void close();
@@ -98,4 +84,4 @@ struct RunFiles {
   std::vector<FrameTimes> times;
 };
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -1,4 +1,4 @@
-#include "app/output_folder.h"
+#include "palpate/session/output_folder.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 #include "palpate/core/errors.h"
 
-namespace palpate::app {
+namespace palpate {
 
 void require_output_folder(const std::filesystem::path& folder) {
   if (folder.empty()) throw BadInput("the output folder is '', expected a name");
@@ -34,4 +34,4 @@ void require_output_folder(const std::filesystem::path& folder) {
   if (!writable) refuse(reason);
 }
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -1,10 +1,10 @@
-#include "app/scene_file.h"
+#include "palpate/session/scene_file.h"
 
 #include <fmt/format.h>
 
 #include "palpate/core/errors.h"
 
-namespace palpate::app {
+namespace palpate {
 
 void describe(Settings& settings, SceneFile& scene_file) {
   settings.group(
@@ -55,4 +55,4 @@ std::string document_scene_file() {
   return document_settings(settings);
 }
 
-}  // namespace palpate::app
+}  // namespace palpate

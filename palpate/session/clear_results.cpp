@@ -1,4 +1,4 @@
-#include "app/clear_results.h"
+#include "palpate/session/clear_results.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 
 #include "palpate/core/errors.h"
 
-namespace palpate::app {
+namespace palpate {
 
 namespace {
 
@@ -38,4 +38,4 @@ void begin_sequence(const std::filesystem::path& folder, const std::filesystem::
   begin(folder, kSequence, input);
 }
 
-}  // namespace palpate::app
+}  // namespace palpate

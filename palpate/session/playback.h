@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "palpate/estimate/force_estimate.h"
 #include "palpate/stereo/recording.h"
 
-namespace palpate::app {
+namespace palpate {
 
 struct PlayedFrame {
   StereoFrame frame;
@@ -18,14 +20,17 @@ struct PlayedFrame {
 /// whose time is over is passed over, and where the computer cannot keep up all the same, the clock is slowed down.
 class Playback {
  public:
-  Playback(Recording& recording, bool realtime) : recording_(recording), realtime_(realtime) {}
+  /// `stopped`: asked while it waits.
+  Playback(Recording& recording, bool realtime, std::function<bool()> stopped)
+      : recording_(recording), realtime_(realtime), stopped_(std::move(stopped)) {}
 
-  /// Waits for the frame's time, not longer than it takes to be interrupted.
+  /// Waits for the frame's time, not longer than it takes to be stopped.
   std::optional<PlayedFrame> next();
 
  private:
   Recording& recording_;
   bool realtime_;
+  std::function<bool()> stopped_;
   std::optional<int64_t> start_ns_;
   int passed_over_ = 0;  ///< in a row, until now
 };
@@ -33,4 +38,4 @@ class Playback {
 /// The row of a frame that was passed over.
 ForceEstimate passed_over(const StereoFrame& frame);
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -1,13 +1,12 @@
-#include "app/playback.h"
+#include "palpate/session/playback.h"
 
 #include <poll.h>
 
 #include <algorithm>
 
-#include "app/runtime.h"
 #include "palpate/stream/clock.h"
 
-namespace palpate::app {
+namespace palpate {
 
 namespace {
 
@@ -25,7 +24,7 @@ std::optional<PlayedFrame> Playback::next() {
     const auto at_ns = static_cast<int64_t>(1e9 * played.frame.time_s);
     if (!start_ns_) start_ns_ = steady_ns() - at_ns;
     const int64_t due_ns = *start_ns_ + at_ns;
-    while (!interrupted() && steady_ns() < due_ns)
+    while (!stopped_() && steady_ns() < due_ns)
       poll(nullptr, 0, static_cast<int>(std::clamp<int64_t>((due_ns - steady_ns()) / 1'000'000, 1, 50)));
     const int64_t late_ns = steady_ns() - due_ns;
     const bool is_over = recording_.fps() > 0 && late_ns > static_cast<int64_t>(1e9 / recording_.fps());
@@ -47,4 +46,4 @@ ForceEstimate passed_over(const StereoFrame& frame) {
   return estimate;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate

@@ -1,0 +1,382 @@
+#include "palpate/session/session.h"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <fstream>
+#include <mutex>
+#include <sstream>
+#include <thread>
+
+#include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
+#include "palpate/session/open_source.h"
+#include "palpate/session/run.h"
+#include "palpate/session/run_folder.h"
+#include "palpate/session/scene_text.h"
+#include "palpate/session/shape.h"
+#include "palpate/stream/clock.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr size_t kMostEditsKept = 500;
+
+std::string text_of_file(const std::filesystem::path& file) {
+  if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+    throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+std::string phase_name(Phase phase) {
+  switch (phase) {
+    case Phase::idle:
+      return "idle";
+    case Phase::ready:
+      return "ready";
+    case Phase::building:
+      return "building";
+    case Phase::running:
+      return "running";
+    case Phase::failed:
+      return "failed";
+  }
+  return {};
+}
+
+/// All but the queue, the flags and the published snapshot belongs to the session's thread.
+struct Session::State {
+  struct Asked {
+    Command command;
+    std::function<void(const std::string&)> done;
+  };
+
+  RootFolder root;
+  std::function<void()> on_change;
+
+  std::mutex mutex;
+  std::condition_variable woken;
+  std::deque<Asked> queue;
+  bool ended = false;
+  std::atomic<bool> stop{false};
+  mutable std::mutex published_mutex;
+  SharedSnapshot published = std::make_shared<Snapshot>();
+
+  Snapshot now;
+  std::vector<std::string> undo, redo;
+  std::string saved_text, built_text;
+  std::vector<std::string> trusted;
+  std::shared_ptr<const SceneFile> run_scene;
+  std::vector<std::shared_ptr<const BuiltMap>> run_maps;  ///< outlive the run that was begun with them
+  std::unique_ptr<Run> run;
+  std::shared_ptr<RowLog> rows;
+  std::unique_ptr<ShapeWriter> shapes;  ///< nothing where the disk takes no more
+  std::thread thread;
+
+  State(RootFolder r, std::function<void()> c) : root(std::move(r)), on_change(std::move(c)) {}
+
+  void publish() {
+    ++now.version;
+    now.is_saved = now.scene_text == saved_text;
+    now.can_undo = !undo.empty();
+    now.can_redo = !redo.empty();
+    now.map_is_stale = now.map && now.scene_text != built_text;
+    auto next = std::make_shared<const Snapshot>(now);
+    {
+      const std::lock_guard lock(published_mutex);
+      published = std::move(next);
+    }
+    if (on_change) on_change();
+  }
+
+  void require_scene() const {
+    if (!now.source) throw BadInput("no recording is open, expected a scene or a recording first");
+  }
+  void require_no_run() const {
+    if (run) throw BadInput("a run goes on, expected it to end first");
+  }
+
+  /// A scene with its source; nothing has changed where it throws.
+  void take_scene(const std::string& text, const std::filesystem::path& file, bool is_trusted) {
+    const SceneFile scene = read_scene_text(text, file);
+    if (is_trusted)
+      trusted = sources_of(scene);
+    else
+      root.require_holds_all(scene, trusted);
+    const std::string before = now.source ? recording_text(now.scene) : "";
+    if (before != recording_text(scene) || file != now.scene_file)
+      now.source = open_source(scene, std::max(0, scene.scene.map.frame));
+    now.scene = scene;
+    now.scene_text = text;
+    now.scene_file = file;
+  }
+
+  void open(const std::filesystem::path& file, const std::string& text, bool is_saved, bool is_trusted) {
+    require_no_run();
+    take_scene(text, file, is_trusted);
+    undo.clear();
+    redo.clear();
+    saved_text = is_saved ? text : "";
+    now.map.reset();
+    now.stages.clear();
+    now.run.reset();
+  }
+
+  void obey(const ask::OpenScene& asked) {
+    const std::filesystem::path file = root.inside(asked.file);
+    open(file, text_of_file(file), true, false);
+  }
+
+  void obey(const ask::OpenRecording& asked) {
+    const std::filesystem::path folder = root.inside(asked.stereo.empty() ? asked.left : asked.stereo).parent_path();
+    const auto relative = [&](const std::string& name) {
+      return name.empty() ? name : root.inside(name).lexically_relative(folder).string();
+    };
+    const std::string text = new_scene_text(relative(asked.left), relative(asked.right), relative(asked.stereo),
+                                            relative(asked.calibration));
+    open(free_file(folder, "scene", ".yaml"), text, false, false);
+  }
+
+  void obey(const ask::Look& asked) {
+    require_scene();
+    require_no_run();
+    now.source = open_source(now.scene, asked.frame);
+  }
+
+  void obey(const ask::Edit& asked) {
+    require_scene();
+    require_no_run();
+    const std::string before = now.scene_text, after = with_changes(before, asked.changes);
+    if (after == before) return;
+    take_scene(after, now.scene_file, false);
+    undo.push_back(before);
+    if (undo.size() > kMostEditsKept) undo.erase(undo.begin());
+    redo.clear();
+  }
+
+  void step(std::vector<std::string>& from, std::vector<std::string>& to) {
+    require_no_run();
+    if (from.empty()) return;
+    const std::string before = now.scene_text;
+    take_scene(from.back(), now.scene_file, false);
+    from.pop_back();
+    to.push_back(before);
+  }
+  void obey(const ask::Undo&) { step(undo, redo); }
+  void obey(const ask::Redo&) { step(redo, undo); }
+
+  void obey(const ask::Save& asked) {
+    require_scene();
+    std::filesystem::path file = now.scene_file;
+    if (!asked.name.empty()) {
+      if (asked.name.find('/') != std::string::npos || !(asked.name.ends_with(".yaml") || asked.name.ends_with(".yml")))
+        throw BadInput(fmt::format("'{}' is no name for a scene, expected NAME.yaml", asked.name));
+      file = now.scene_file.parent_path() / asked.name;
+    }
+    if (!root.holds(file)) throw BadInput(fmt::format("{} is outside of {}", file.string(), root.path().string()));
+    write_whole_file(file, now.scene_text);
+    now.scene_file = now.scene.file = file;
+    saved_text = now.scene_text;
+  }
+
+  /// Publishes each stage as it begins; `begun` is when the last one did.
+  OnStage watch_stages(int64_t& begun) {
+    now.phase = Phase::building;
+    now.sentence.clear();
+    now.stages = {{"read", 0}};
+    publish();
+    return [this, &begun](const std::string& stage) {
+      if (stop) throw Unfinished("the build was stopped");
+      end_stage(begun);
+      now.stages.push_back({stage, 0});
+      publish();
+    };
+  }
+  void end_stage(int64_t& begun) {
+    const int64_t at = steady_ns();
+    if (!now.stages.empty()) now.stages.back().ms += static_cast<double>(at - begun) * 1e-6;
+    begun = at;
+  }
+
+  void obey(const ask::Build&) {
+    require_scene();
+    require_no_run();
+    stop = false;
+    int64_t begun = steady_ns();
+    BuildWatch watch;
+    watch.on_stage = watch_stages(begun);
+    auto built = std::make_shared<const BuiltMap>(build_map(now.scene, watch));
+    end_stage(begun);
+    now.map = std::move(built);
+    ++now.map_number;
+    built_text = now.scene_text;
+  }
+
+  void obey(const ask::Start& asked) {
+    require_scene();
+    require_no_run();
+    if (!now.map) throw BadInput("there is no map yet, expected it to be built first");
+    if (now.scene_text != built_text)
+      throw BadInput("the scene has changed since its map was built, expected it to be built again");
+    stop = false;
+    RunView view;
+    view.folder = free_file(root.path() / "runs", now.scene_file.stem().string(), "");
+    run_scene = std::make_shared<const SceneFile>(now.scene);
+    run_maps = {now.map};
+    run = std::make_unique<Run>(*run_scene, *now.map, view.folder, Truths{},
+                                RunControl{asked.realtime, [this] { return stop.load(); }});
+    view.frame_count = run->frame_count();
+    keep_shape([&] { shapes = std::make_unique<ShapeWriter>(view.folder / "shapes.bin", *now.map); });
+    view.rows = rows = std::make_shared<RowLog>();
+    now.run = std::move(view);
+    now.phase = Phase::running;
+  }
+
+  void obey(const ask::Stop&) { stop = true; }
+
+  void obey(const ask::Mark& asked) {
+    if (!now.run || !now.run->shown) throw BadInput("nothing runs that could be marked");
+    const ForceEstimate& at = now.run->shown->estimate;
+    now.run->marks.push_back({at.frame, at.time_s, asked.text.empty() ? "mark" : asked.text});
+    write_marks(*now.run);
+  }
+
+  void obey(const ask::Rest&) {
+    if (!run || !now.run->shown) throw BadInput("nothing runs whose present frame could be the state at rest");
+    int64_t begun = steady_ns();
+    auto built =
+        std::make_shared<const BuiltMap>(build_map_again(*run_scene, *now.map, run->last_frame(), watch_stages(begun)));
+    end_stage(begun);
+    run->take_map(*built);
+    run_maps.push_back(built);
+    now.map = std::move(built);
+    ++now.map_number;
+    obey(ask::Mark{"map built again from this frame"});
+  }
+
+  /// Where a command leads back to, whether it was obeyed or not.
+  Phase phase_at_rest() const { return run ? Phase::running : now.source ? Phase::ready : Phase::idle; }
+
+  void obey(const Asked& asked) {
+    std::string sentence;
+    try {
+      std::visit([this](const auto& command) { obey(command); }, asked.command);
+    } catch (const std::exception& error) {
+      sentence = error.what();
+    }
+    // An edit that is refused is told to who made it, and is no failure of the session.
+    const bool fails = !sentence.empty() && !std::holds_alternative<ask::Edit>(asked.command);
+    if (fails || sentence.empty()) {
+      now.phase = fails && !run ? Phase::failed : phase_at_rest();
+      now.sentence = fails ? sentence : "";
+    }
+    publish();
+    if (asked.done) asked.done(sentence);
+  }
+
+  /// Shapes are for looking at: a run goes on without.
+  template <class Work>
+  void keep_shape(const Work& work) {
+    try {
+      work();
+    } catch (const Unfinished&) {
+      shapes.reset();
+    }
+  }
+
+  void step_run() {
+    std::optional<RunFrame> frame = run->next();
+    if (frame) {
+      const ForceEstimate& estimate = frame->estimate;
+      for (const std::string& warning : estimate.warnings) now.run->passed_over += warning == "frame_passed_over";
+      rows->add(run->files().rows.back());
+      if (shapes) keep_shape([&] { shapes->write(estimate); });
+      now.run->shown = std::make_shared<const RunFrame>(std::move(*frame));
+      now.run->shown_ns = steady_ns();
+      publish();
+      return;
+    }
+    end_run();
+    publish();
+  }
+
+  void end_run() {
+    run->close();
+    now.run->over = true;
+    now.run->end = run->files().losses.text();
+    run.reset();
+    shapes.reset();
+    run_maps.clear();
+    now.phase = phase_at_rest();
+  }
+
+  void work() {
+    pthread_setname_np(pthread_self(), "palpate-session");
+    while (true) {
+      std::optional<Asked> asked;
+      {
+        std::unique_lock lock(mutex);
+        if (!run) woken.wait(lock, [this] { return ended || !queue.empty(); });
+        if (ended) break;
+        if (!queue.empty()) {
+          asked = std::move(queue.front());
+          queue.pop_front();
+        }
+      }
+      if (asked)
+        obey(*asked);
+      else
+        step_run();
+    }
+    if (run) end_run();
+  }
+};
+
+Session::Session(RootFolder root, std::function<void()> on_change)
+    : state_(std::make_unique<State>(std::move(root), std::move(on_change))) {
+  state_->thread = std::thread([this] { state_->work(); });
+}
+
+Session::~Session() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->ended = state_->stop = true;
+  }
+  state_->woken.notify_one();
+  state_->thread.join();
+}
+
+void Session::open_trusted(const std::filesystem::path& scene) {
+  // Nothing has been asked yet, so the thread sleeps.
+  const std::filesystem::path file = std::filesystem::absolute(scene).lexically_normal();
+  state_->open(file, text_of_file(file), true, true);
+  state_->now.phase = Phase::ready;
+  state_->publish();
+}
+
+void Session::ask(Command command, std::function<void(const std::string& sentence)> done) {
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (std::holds_alternative<ask::Stop>(command)) state_->stop = true;
+    state_->queue.push_back({std::move(command), std::move(done)});
+  }
+  state_->woken.notify_one();
+}
+
+SharedSnapshot Session::newest() const {
+  const std::lock_guard lock(state_->published_mutex);
+  return state_->published;
+}
+
+const RootFolder& Session::root() const {
+  return state_->root;
+}
+
+}  // namespace palpate
