@@ -31,8 +31,23 @@ function Lost({since}: {since: number}) {
   );
 }
 
+/** Dark, unless this computer or its user prefers light. */
+function useTheme(): [string, () => void] {
+  const [theme, setTheme] = useState(
+    localStorage.getItem('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'),
+  );
+  document.documentElement.dataset['theme'] = theme;
+  const change = () => {
+    const next = theme === 'dark' ? 'light' : 'dark';
+    localStorage.setItem('theme', next);
+    setTheme(next);
+  };
+  return [theme, change];
+}
+
 export function App() {
   const state = useLive();
+  const [theme, changeTheme] = useTheme();
   const [panel, setPanel] = useState<PanelName>(panelOfAddress());
   useEffect(() => {
     const follow = () => setPanel(panelOfAddress());
@@ -63,6 +78,9 @@ export function App() {
         <span class={`phase ${state.connected ? state.phase : 'failed'}`} role="status">
           {state.connected ? kPhases[state.phase] : 'no connection'}
         </span>
+        <button class="small" onClick={changeTheme} aria-label={`${theme === 'dark' ? 'light' : 'dark'} colours`}>
+          {theme === 'dark' ? '☀' : '☾'}
+        </button>
       </header>
       {!state.connected && state.lostSince !== null && state.scene && <Lost since={state.lostSince} />}
       {state.phase === 'failed' && state.sentence && (

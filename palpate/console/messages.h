@@ -26,10 +26,12 @@ std::string pong_json(double ping);
 
 /// What one viewer has been told already; a new viewer nothing.
 struct ToldSoFar {
-  std::string scene_text = "?";
+  bool nothing = true;
+  std::filesystem::path scene_file;
+  std::string scene_text;
   bool is_saved = false, can_undo = false, can_redo = false;
   std::shared_ptr<const SourceView> source;
-  uint64_t map_number = UINT64_MAX;
+  std::shared_ptr<const BuiltMap> map;
   bool map_is_stale = false;
   std::shared_ptr<const RowLog> log;
   size_t rows = 0;

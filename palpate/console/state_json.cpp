@@ -104,18 +104,19 @@ std::string state_json(const Snapshot& s, const RootFolder& root, ToldSoFar& tol
   ordered_json json = {{"version", s.version}, {"phase", phase_name(s.phase)}, {"sentence", s.sentence}};
   json["stages"] = ordered_json::array();
   for (const StageTime& stage : s.stages) json["stages"].push_back({stage.stage, std::round(stage.ms)});
-  const bool scene_is_new = told.scene_text != s.scene_text || told.is_saved != s.is_saved ||
-                            told.can_undo != s.can_undo || told.can_redo != s.can_redo;
+  const bool scene_is_new = told.nothing || told.scene_file != s.scene_file || told.scene_text != s.scene_text ||
+                            told.is_saved != s.is_saved || told.can_undo != s.can_undo || told.can_redo != s.can_redo;
   if (scene_is_new) json["scene"] = scene_json(s, root);
   if (told.source != s.source || scene_is_new) json["source"] = s.source ? source_json(*s.source) : ordered_json();
-  if (told.map_number != s.map_number || told.map_is_stale != s.map_is_stale || scene_is_new)
-    json["map"] = map_state(s);
+  if (told.map != s.map || told.map_is_stale != s.map_is_stale || scene_is_new) json["map"] = map_state(s);
+  told.nothing = false;
+  told.scene_file = s.scene_file;
   told.scene_text = s.scene_text;
   told.is_saved = s.is_saved;
   told.can_undo = s.can_undo;
   told.can_redo = s.can_redo;
   told.source = s.source;
-  told.map_number = s.map_number;
+  told.map = s.map;
   told.map_is_stale = s.map_is_stale;
   has_more = false;
   json["run"] = s.run ? run_state(*s.run, root) : ordered_json();

@@ -74,6 +74,13 @@ ForceRow parse_row(const Table& table, const Table::Row& line, const std::filesy
   row.warnings = table.text(line, "warnings");
   row.force_low_N = number("force_low_N");
   row.force_high_N = number("force_high_N");
+  row.force_low_total_N = finite_or(number("force_low_total_N"), 0);
+  row.force_high_total_N = finite_or(number("force_high_total_N"), 0);
+  if (const std::string grip = table.text(line, "grip"); !grip.empty()) row.grip = grip;
+  row.p_contact = finite_or(number("p_contact"), 0);
+  row.footprint_mm = finite_or(number("footprint_mm"), 0);
+  row.scene_mm = vector("scene_x_mm", "scene_y_mm", "scene_z_mm");
+  if (!row.scene_mm.allFinite()) row.scene_mm.setZero();
   return row;
 }
 

@@ -10,9 +10,9 @@ namespace palpate {
 
 namespace {
 
-constexpr const char* kResults[] = {"forces.csv",  "forces_2.csv", "overlay.mp4",   "report.html",
-                                    "run.yaml",    "map.vtu",      "surface.ply",   "cloud.ply",
-                                    "preview.png", "map.json",     "confidence.png"};
+constexpr const char* kResults[] = {"forces.csv",     "forces_2.csv", "overlay.mp4", "report.html", "run.yaml",
+                                    "map.vtu",        "surface.ply",  "cloud.ply",   "preview.png", "map.json",
+                                    "confidence.png", "marks.csv",    "shapes.bin"};
 constexpr const char* kSequence[] = {"left.mp4",    "right.mp4",        "truth.csv",
                                      "truth_2.csv", "calibration.yaml", "scene.yaml"};
 

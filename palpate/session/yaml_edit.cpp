@@ -55,10 +55,11 @@ YAML::Node expected_tree(const YAML::Node& node, const std::vector<std::string>&
   if (depth == path.size()) return value;
   const std::string& name = path[depth];
   const bool removes = depth + 1 == path.size() && !value.IsDefined();
-  if (node.IsSequence()) {
+  const bool begins_list = name == "+" && (node.IsNull() || (node.IsMap() && node.size() == 0));
+  if (node.IsSequence() || begins_list) {
     YAML::Node list(YAML::NodeType::Sequence);
     const std::optional<size_t> number = item_number(node, name);
-    for (size_t i = 0; i < node.size(); ++i)
+    for (size_t i = 0; i < (begins_list ? 0 : node.size()); ++i)
       if (number != i)
         list.push_back(node[i]);
       else if (!removes)
@@ -123,7 +124,8 @@ std::string replaced(const std::string& text, TextSpan span, const std::string& 
 /// "b: {c: value}" for what is left of a path.
 std::string nested(const std::vector<std::string>& path, size_t depth, const std::string& value) {
   std::string text = value;
-  for (size_t i = path.size(); i > depth + 1; --i) text = fmt::format("{{{}: {}}}", path[i - 1], text);
+  for (size_t i = path.size(); i > depth + 1; --i)
+    text = path[i - 1] == "+" ? "[" + text + "]" : fmt::format("{{{}: {}}}", path[i - 1], text);
   return text;
 }
 

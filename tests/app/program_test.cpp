@@ -86,12 +86,17 @@ TEST(Program, CheckSaysWhyAVideoWithoutInstrumentCannotPlaceATipTrack) {
   EXPECT_FALSE(track.contains("time_offset_s"));
 }
 
-TEST(Program, VerbsThatAreNotThereYetSaySoAndEndWithTwo) {
-  for (const char* verb : {"console"}) {
-    const Outcome outcome = run_palpate(verb);
-    EXPECT_EQ(outcome.exit_code, 2) << verb;
-    EXPECT_THAT(outcome.error, HasSubstr("not there yet")) << verb;
-  }
+TEST(Program, ConsoleRefusesWhatItCannotOpenWithThree) {
+  const Workspace workspace;
+  const Outcome no_scene = run_palpate("console --port 0 --root /tmp " + (workspace / "none.yaml").string());
+  EXPECT_EQ(no_scene.exit_code, 3);
+  EXPECT_THAT(no_scene.error, HasSubstr("does not exist, expected a YAML scene file"));
+  const Outcome no_root = run_palpate("console --port 0 --root " + (workspace / "none").string());
+  EXPECT_EQ(no_root.exit_code, 3);
+  EXPECT_THAT(no_root.error, HasSubstr("--root"));
+  const Outcome no_address = run_palpate("console --port 0 --bind nowhere --root /tmp");
+  EXPECT_EQ(no_address.exit_code, 3);
+  EXPECT_THAT(no_address.error, HasSubstr("--bind is 'nowhere'"));
 }
 
 TEST(Program, WrongUseEndsWithTwo) {

@@ -75,6 +75,8 @@ TEST(YamlEdit, AddsAndTakesAwayItemsOfAList) {
   EXPECT_EQ(changed({"attachments", "0"}, ""), scene_with("  - underside: {depth_mm: 3}   # far side\n", ""));
   EXPECT_EQ(changed({"attachments", "1"}, ""),
             scene_with("  - sphere:\n      center_mm: [0, 0, 90]\n      radius_mm: 5\n", ""));
+  EXPECT_EQ(with_changes("map: {}\n", {{{"map", "labels", "+"}, "{name: x}"}}), "map: {labels: [{name: x}]}\n");
+  EXPECT_EQ(with_changes("a:\n", {{{"a", "+"}, "1"}}), "a: [1]\n");
   EXPECT_EQ(with_changes("a: [1, 2, 3]\n", {{{"a", "1"}, ""}, {{"a", "+"}, "4"}}), "a: [1, 3, 4]\n");
 }
 

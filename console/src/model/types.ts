@@ -77,6 +77,11 @@ export interface Row {
   footprint_mm: number;
 }
 
+/** False where the next frame was there before this one could be looked at. */
+export function wasLookedAt(row: Row): boolean {
+  return !row.warnings.includes('frame_passed_over');
+}
+
 type RawRow = [number, number, string, number, number, number, number, number, number, number, number, number, number,
   number, number, string, string, number, number];
 

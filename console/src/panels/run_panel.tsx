@@ -5,6 +5,7 @@ import {ForceChart} from '../parts/force_chart';
 import {Gauge} from '../parts/gauge';
 import {Lazy3d} from '../parts/lazy3d';
 import {age_ms, LivePicture} from '../parts/live_picture';
+import {wasLookedAt} from '../model/types';
 import {Grip, StatusLamp} from '../parts/status';
 
 function frameRate(): number {
@@ -51,7 +52,7 @@ export function RunPanel() {
   const page = useRef<HTMLDivElement>(null);
   const {run, rows, scene, map, phase} = state;
   const isRunning = !!run && !run.over;
-  const row = rows.at(-1) ?? null;
+  const row = rows.findLast(wasLookedAt) ?? null;
   const peak = useMemo(() => rows.reduce((most, r) => Math.max(most, r.magnitude_N), 0), [rows]);
 
   useEffect(() => {
@@ -68,7 +69,7 @@ export function RunPanel() {
   };
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
-      const isWriting = event.target instanceof HTMLElement && event.target.matches('input, select, textarea');
+      const isWriting = event.target instanceof HTMLElement && event.target.matches('input:not([type=checkbox], [type=range], [type=radio]), select, textarea');
       if (isWriting || event.ctrlKey || event.metaKey || event.altKey) return;
       const keys: {[key: string]: () => void} = {r: toggle, m: mark, z: rest, f: fullScreen};
       keys[event.key.toLowerCase()]?.();

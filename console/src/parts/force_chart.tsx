@@ -1,6 +1,6 @@
 import {useEffect, useRef, useState} from 'preact/hooks';
 import uPlot from 'uplot';
-import type {Row} from '../model/types';
+import {type Row, wasLookedAt} from '../model/types';
 
 const kWindow_s = 10;
 
@@ -18,7 +18,9 @@ function colour(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-function dataOf(rows: Row[]): uPlot.AlignedData {
+/** Frames that were passed over tell nothing and break no line. */
+function dataOf(all: Row[]): uPlot.AlignedData {
+  const rows = all.filter(wasLookedAt);
   const known = (row: Row, value: number) => (row.status === 'tool_lost' || row.status === 'not_converged' ? null : value);
   return [
     rows.map((row) => row.time_s),
@@ -64,6 +66,16 @@ function wheelAndPan(isMoved: () => void): uPlot.Plugin {
   };
 }
 
+/** The highest of what is seen, with a little air. */
+function fitHeight(u: uPlot) {
+  const {min, max} = u.scales['x']!;
+  let most = 0;
+  u.data[0].forEach((time, i) => {
+    if (time >= (min ?? -Infinity) && time <= (max ?? Infinity)) most = Math.max(most, u.data[1]?.[i] ?? 0, u.data[3]?.[i] ?? 0);
+  });
+  u.setScale('y', {min: 0, max: Math.max(0.1, most * 1.08)});
+}
+
 function save(name: string, blob: Blob) {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
@@ -92,7 +104,7 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
     const axis = {stroke: colour('--muted'), grid: {stroke: colour('--line'), width: 1}, ticks: {stroke: colour('--line')}};
     const options: uPlot.Options = {
       width: host.clientWidth || 600, height: host.clientHeight || 160,
-      scales: {x: {time: false}, y: {range: (_, __, max) => [0, Math.max(0.1, (max ?? 0) * 1.08)]}},
+      scales: {x: {time: false}, y: {auto: false, min: 0, max: 1}},
       axes: [{...axis, values: (_, ticks) => ticks.map((tick) => `${+tick.toFixed(2)} s`)}, {...axis, size: 52, label: unit, labelSize: 18, labelGap: 0}],
       series: [
         {label: 'time', value: (_, value) => (value == null ? '–' : `${value.toFixed(2)} s`)},
@@ -105,6 +117,7 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
       legend: {live: true},
       plugins: [wheelAndPan(() => setFollows(false))],
       hooks: {
+        setScale: [(u, key) => key === 'x' && fitHeight(u)],
         setSelect: [(u) => u.select.width > 2 && setFollows(false)],
         draw: [(u) => {
           if (moment.current === undefined) return;

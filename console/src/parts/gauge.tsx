@@ -55,7 +55,7 @@ export function Gauge({row, peak_N, unit, tissue}: Props) {
   const scale = scaleFor(Math.max(peak_N * 1.1, 0.15));
   return (
     <section class="gauge" aria-label="force">
-      <svg viewBox="0 0 200 150" role="img" aria-label={`force ${force.toFixed(2)} ${unit}`}>
+      <svg viewBox="-8 -10 216 166" role="img" aria-label={`force ${force.toFixed(2)} ${unit}`}>
         <path class="track" d={arc(0, 1, 82)} />
         {isKnown && row.high_N > row.low_N && <path class="band" d={arc(row.low_N / scale, row.high_N / scale, 82)} />}
         {isKnown && force > 0 && <path class="value" d={arc(0, force / scale, 68)} />}
@@ -67,7 +67,7 @@ export function Gauge({row, peak_N, unit, tissue}: Props) {
             </text>
           );
         })}
-        <text x="100" y="104" class="reading" data-testid="force">
+        <text x="100" y="104" class="reading" data-testid="force" data-frame={row?.frame}>
           {isKnown ? force.toFixed(2) : '–'}
         </text>
         <text x="100" y="124" class="unit">

@@ -12,7 +12,9 @@ interface Props {
   force_N?: [number, number, number] | undefined;
 }
 
-const kArrow_mm_per_N = 12;
+/** Of the greatest force so far. */
+const kLongestArrow_mm = 25;
+const kTissue = new THREE.Color('#c08a84');
 const kFixed = new THREE.Color('#e0872e'), kNotSeen = new THREE.Color('#5b6b86'), kSeen = new THREE.Color('#57b8a5');
 // Viridis at five places, as the overlay has it.
 const kViridis = ['#440154', '#3b528b', '#21918c', '#5ec962', '#fde725'].map((hex) => new THREE.Color(hex));
@@ -22,12 +24,13 @@ function viridis(share: number): THREE.Color {
   return kViridis[below]!.clone().lerp(kViridis[below + 1]!, at - below);
 }
 
-function coloursOf(shape: Shape, colouring: Colouring): Float32Array {
+/** Stress as in the overlay: none leaves the tissue as it is. */
+function coloursOf(shape: Shape, colouring: Colouring, most_kPa: number): Float32Array {
   const colours = new Float32Array(shape.positions_mm.length);
-  const most = shape.stress_kPa.reduce((a, b) => Math.max(a, b), 1e-9);
   for (let i = 0; i < shape.flags.length; ++i) {
     const flags = shape.flags[i]!;
-    const colour = colouring === 'stress' ? viridis(shape.stress_kPa[i]! / most) : flags & 1 ? kFixed : flags & 2 ? kNotSeen : kSeen;
+    const share = shape.stress_kPa[i]! / most_kPa;
+    const colour = colouring === 'stress' ? kTissue.clone().lerp(viridis(share), Math.min(1, 4 * share)) : flags & 1 ? kFixed : flags & 2 ? kNotSeen : kSeen;
     colour.toArray(colours, 3 * i);
   }
   return colours;
@@ -45,6 +48,9 @@ class Stage {
   private body: THREE.Mesh | null = null;
   private edges: THREE.LineSegments | null = null;
   private isFramed = false;
+  /** The highest so far, so that colours keep their meaning. */
+  private most_kPa = 1e-9;
+  private most_N = 1e-3;
 
   constructor(host: HTMLElement) {
     this.renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
@@ -79,9 +85,10 @@ class Stage {
     }
     this.body = this.edges = null;
     if (!shape) return this.draw();
+    this.most_kPa = shape.stress_kPa.reduce((a, b) => Math.max(a, b), this.most_kPa);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(shape.positions_mm, 3));
-    geometry.setAttribute('color', new THREE.BufferAttribute(coloursOf(shape, colouring), 3));
+    geometry.setAttribute('color', new THREE.BufferAttribute(coloursOf(shape, colouring, this.most_kPa), 3));
     geometry.setIndex(new THREE.BufferAttribute(shape.triangles, 1));
     geometry.computeVertexNormals();
     const clipping = {clippingPlanes: [this.plane]};
@@ -105,12 +112,14 @@ class Stage {
   point(tip: [number, number, number] | undefined, force: [number, number, number] | undefined) {
     this.tip.visible = !!tip;
     if (tip) this.tip.position.set(...tip);
-    const f = new THREE.Vector3(...(force ?? [0, 0, 0])), length = f.length() * kArrow_mm_per_N;
+    const f = new THREE.Vector3(...(force ?? [0, 0, 0]));
+    this.most_N = Math.max(this.most_N, f.length());
+    const length = (kLongestArrow_mm * f.length()) / this.most_N;
     this.arrow.visible = !!tip && length > 0.5;
     if (tip && this.arrow.visible) {
       this.arrow.setDirection(f.clone().normalize());
       this.arrow.setLength(length, Math.min(4, length * 0.4), Math.min(2.4, length * 0.25));
-      this.arrow.position.set(...tip).addScaledVector(f.normalize(), -length);
+      this.arrow.position.set(...tip);
     }
     this.draw();
   }
@@ -148,8 +157,8 @@ export default function View3d({shape, colouring, tip_mm, force_N}: Props) {
       setIsMissing(true);
       return;
     }
-    const made = stage.current, fit = new ResizeObserver(() => made.fit(host.current!));
-    fit.observe(host.current!);
+    const made = stage.current, place = host.current!, fit = new ResizeObserver(() => made.fit(place));
+    fit.observe(place);
     return () => {
       fit.disconnect();
       made.dispose();
