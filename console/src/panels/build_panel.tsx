@@ -3,6 +3,7 @@ import {useAsk, useLive} from '../model/hooks';
 import {fetchShape, type Shape} from '../model/shape';
 import type {MapState} from '../model/types';
 import {Lazy3d} from '../parts/lazy3d';
+import {Said} from '../parts/said';
 
 const kStages: [string, string][] = [
   ['read', 'opened and read'], ['rectify', 'both eyes rectified'], ['match', 'points matched'],
@@ -71,7 +72,7 @@ export function BuildPanel() {
         </span>
         {map && !map.stale && <a class="button primary" href="#run">Go on to the run</a>}
       </div>
-      {sentence && phase !== 'failed' && <div class="banner" role="alert">{sentence} <button onClick={forget}>Close</button></div>}
+      <Said sentence={sentence} forget={forget} />
       {map?.stale && !isBuilding && <div class="banner">The scene has changed since this map was built.</div>}
       <div class="map-view">
         {!map && !isBuilding && <p class="hint">The map is built from the frame at rest, instrument away, that the scene names.</p>}

@@ -7,6 +7,7 @@ import {Lazy3d} from '../parts/lazy3d';
 import {age_ms, LivePicture} from '../parts/live_picture';
 import {wasLookedAt} from '../model/types';
 import {Grip, StatusLamp} from '../parts/status';
+import {Said} from '../parts/said';
 
 function frameRate(): number {
   const times = live.drawn;
@@ -108,11 +109,7 @@ export function RunPanel() {
           Surgeon’s view <kbd>F</kbd>
         </button>
       </div>
-      {sentence && (
-        <div class="banner" role="alert">
-          {sentence} <button onClick={forget}>Close</button>
-        </div>
-      )}
+      <Said sentence={sentence} forget={forget} />
       {map?.stale && !isRunning && <div class="banner">The scene has changed since its map was built: <a href="#build">build again</a>.</div>}
       <div class="video">
         <LivePicture />

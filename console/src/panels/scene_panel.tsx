@@ -5,6 +5,7 @@ import type {SceneState, Yaml} from '../model/types';
 import {Attachments} from '../parts/attachments';
 import {Drawing, type Outline} from '../parts/drawing';
 import {Field, GroupForm} from '../parts/form';
+import {Said} from '../parts/said';
 
 type Tool = 'none' | 'polygon' | 'lasso' | 'point';
 
@@ -89,10 +90,11 @@ export function ScenePanel() {
   const [active, setActive] = useState('organ');
   const [tool, setTool] = useState<Tool>('none');
   const [label, setLabel] = useState({name: 'tumour', modulus: '60'});
-  const [name, setName] = useState('');
   const [saved, setSaved] = useState('');
   const file = scene?.file.split('/').at(-1) ?? '';
-  useEffect(() => setName(file), [file]);
+  const [typed, setTyped] = useState({of: file, name: file});
+  const name = typed.of === file ? typed.name : file;
+  const setName = (next: string) => setTyped({of: file, name: next});
 
   const edit = (changes: Change[]) => void ask('edit', {changes});
   const begin = (id: string, next: Tool) => {
@@ -161,11 +163,7 @@ export function ScenePanel() {
           <span role="status">{saved}</span>
         </span>
       </div>
-      {sentence && (
-        <div class="banner" role="alert">
-          {sentence} <button onClick={forget}>Close</button>
-        </div>
-      )}
+      <Said sentence={sentence} forget={forget} />
       <div class="picture">
         <Drawing
           image={`/api/source/left.jpg?frame=${source.frame}&of=${encodeURIComponent(scene.file)}`}

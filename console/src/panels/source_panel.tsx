@@ -3,6 +3,7 @@ import {useAsk, useKeys, useLive} from '../model/hooks';
 import {at, textOf} from '../model/scene_yaml';
 import type {SceneState, SourceState} from '../model/types';
 import {GroupForm} from '../parts/form';
+import {Said} from '../parts/said';
 
 interface FileEntry {
   name: string;
@@ -69,7 +70,7 @@ function Browser() {
           <button key={i} class="link" onClick={() => setFolder(steps.slice(0, i + 1).join('/'))}>/ {step}</button>
         ))}
       </nav>
-      {sentence && <div class="banner" role="alert">{sentence} <button onClick={forget}>Close</button></div>}
+      <Said sentence={sentence} forget={forget} />
       <ul class="files">
         {files.map((f) => (
           <li key={f.file} class={`kind-${f.kind}`}>

@@ -26,7 +26,13 @@ const kClose_px = 9, kLassoNear_px = 2.5;
 /** The left image with outlines whose corners move, by pointer or by arrow keys. */
 export function Drawing({image, width, height, outlines, active, tool, change}: Props) {
   const svg = useRef<SVGSVGElement>(null);
-  const [draft, setDraft] = useState<Point[]>([]);
+  const [draft, showDraft] = useState<Point[]>([]);
+  // Presses may come faster than the page is drawn.
+  const newest = useRef<Point[]>([]);
+  const setDraft = (points: Point[]) => {
+    newest.current = points;
+    showDraft(points);
+  };
   const [hover, setHover] = useState<Point | null>(null);
   const [moved, setMoved] = useState<{id: string; points: Point[]} | null>(null);
   useEffect(() => setDraft([]), [tool, active]);
@@ -47,9 +53,9 @@ export function Drawing({image, width, height, outlines, active, tool, change}: 
     const at = place(event);
     if (tool === 'point') return change(active, [at]);
     if (tool === 'polygon') {
-      const first = draft[0];
-      if (draft.length >= 3 && first && Math.hypot(at[0] - first[0], at[1] - first[1]) < kClose_px * scale()) return finish(draft);
-      return setDraft([...draft, at]);
+      const corners = newest.current, first = corners[0];
+      if (corners.length >= 3 && first && Math.hypot(at[0] - first[0], at[1] - first[1]) < kClose_px * scale()) return finish(corners);
+      return setDraft([...corners, at]);
     }
     const line: Point[] = [at];
     const move = (next: PointerEvent) => {
@@ -105,7 +111,7 @@ export function Drawing({image, width, height, outlines, active, tool, change}: 
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
       if (event.target instanceof HTMLElement && event.target.matches('input, select, textarea')) return;
-      if (event.key === 'Enter' && draft.length >= 3) finish(draft);
+      if (event.key === 'Enter' && newest.current.length >= 3) finish(newest.current);
       if (event.key === 'Escape') setDraft([]);
     };
     addEventListener('keydown', press);
@@ -120,7 +126,7 @@ export function Drawing({image, width, height, outlines, active, tool, change}: 
       viewBox={`0 0 ${width} ${height}`}
       onPointerDown={press}
       onPointerMove={(event) => setHover(place(event))}
-      onDblClick={() => draft.length >= 3 && finish(draft)}
+      onDblClick={() => newest.current.length >= 3 && finish(newest.current)}
       aria-label="left image with the outlines of the scene"
       role="group"
     >

@@ -30,6 +30,18 @@ function dataOf(all: Row[]): uPlot.AlignedData {
   ];
 }
 
+/** Shows this part of the time, and forces up to the highest in it. */
+function zoom(u: uPlot, min: number, max: number) {
+  let most = 0;
+  u.data[0].forEach((time, i) => {
+    if (time >= min && time <= max) most = Math.max(most, u.data[1]?.[i] ?? 0, u.data[3]?.[i] ?? 0);
+  });
+  u.batch(() => {
+    u.setScale('x', {min, max});
+    u.setScale('y', {min: 0, max: Math.max(0.1, most * 1.08)});
+  });
+}
+
 /** The wheel zooms around the pointer, a drag with the middle button or shift pans. */
 function wheelAndPan(isMoved: () => void): uPlot.Plugin {
   return {
@@ -41,7 +53,7 @@ function wheelAndPan(isMoved: () => void): uPlot.Plugin {
           if (min == null || max == null) return;
           const at = plot.posToVal(event.offsetX, 'x'), factor = event.deltaY < 0 ? 0.8 : 1.25;
           isMoved();
-          plot.setScale('x', {min: at - (at - min) * factor, max: at + (max - at) * factor});
+          zoom(plot, at - (at - min) * factor, at + (max - at) * factor);
         });
         plot.over.addEventListener('pointerdown', (event) => {
           if (event.button !== 1 && !event.shiftKey) return;
@@ -52,7 +64,7 @@ function wheelAndPan(isMoved: () => void): uPlot.Plugin {
           const perPixel = (max! - min!) / plot.over.clientWidth;
           const move = (moved: PointerEvent) => {
             const by = (start - moved.clientX) * perPixel;
-            plot.setScale('x', {min: min! + by, max: max! + by});
+            zoom(plot, min! + by, max! + by);
           };
           const up = () => {
             removeEventListener('pointermove', move);
@@ -64,16 +76,6 @@ function wheelAndPan(isMoved: () => void): uPlot.Plugin {
       },
     },
   };
-}
-
-/** The highest of what is seen, with a little air. */
-function fitHeight(u: uPlot) {
-  const {min, max} = u.scales['x']!;
-  let most = 0;
-  u.data[0].forEach((time, i) => {
-    if (time >= (min ?? -Infinity) && time <= (max ?? Infinity)) most = Math.max(most, u.data[1]?.[i] ?? 0, u.data[3]?.[i] ?? 0);
-  });
-  u.setScale('y', {min: 0, max: Math.max(0.1, most * 1.08)});
 }
 
 function save(name: string, blob: Blob) {
@@ -113,12 +115,17 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
         {label: `force ${unit}`, stroke: colour('--force'), width: 2, value: (_, v) => (v == null ? '–' : v.toFixed(3))},
       ],
       bands: [{series: [1, 2], fill: colour('--band-fill')}],
-      cursor: {drag: {x: true, y: false}, points: {size: 6}},
+      cursor: {drag: {x: true, y: false, setScale: false}, points: {size: 6}},
       legend: {live: true},
       plugins: [wheelAndPan(() => setFollows(false))],
       hooks: {
-        setScale: [(u, key) => key === 'x' && fitHeight(u)],
-        setSelect: [(u) => u.select.width > 2 && setFollows(false)],
+        setSelect: [(u) => {
+          const {left, width} = u.select;
+          if (width < 3) return;
+          u.setSelect({left: 0, top: 0, width: 0, height: 0}, false);
+          setFollows(false);
+          zoom(u, u.posToVal(left, 'x'), u.posToVal(left + width, 'x'));
+        }],
         draw: [(u) => {
           if (moment.current === undefined) return;
           const x = u.valToPos(moment.current, 'x', true);
@@ -149,8 +156,8 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
     made.setData(dataOf(rows), false);
     const end = rows.at(-1)?.time_s ?? 0, begin = rows[0]?.time_s ?? 0;
     if (!follows.current) made.redraw();
-    else if (isLive) made.setScale('x', {min: Math.max(begin, end - kWindow_s), max: Math.max(end, begin + 1)});
-    else made.setScale('x', {min: begin, max: Math.max(end, begin + 0.1)});
+    else if (isLive) zoom(made, Math.max(begin, end - kWindow_s), Math.max(end, begin + 1));
+    else zoom(made, begin, Math.max(end, begin + 0.1));
   }, [rows, isLive, isFollowing, unit]);
   useEffect(() => plot.current?.redraw(false), [at_s]);
 

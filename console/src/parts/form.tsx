@@ -12,12 +12,12 @@ interface FieldProps {
 export function Field({row, scene}: FieldProps) {
   const path = row.key.split('.'), name = path.at(-1)!;
   const written = textOf(at(scene.values, path));
-  const [text, setText] = useState(written);
+  // What is being typed belongs to the value that it is to replace.
+  const [typed, setTyped] = useState({of: written, text: written});
+  const text = typed.of === written ? typed.text : written;
+  const setText = (next: string) => setTyped({of: written, text: next});
   const [ask, sentence, forget] = useAsk();
-  useEffect(() => {
-    setText(written);
-    forget();
-  }, [written]);
+  useEffect(forget, [written]);
   const put = (value: string) => {
     if (value.trim() === written) return forget();
     void ask('edit', {changes: [{path, value: yamlOfText(value)}]});
