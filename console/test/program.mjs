@@ -75,3 +75,65 @@ export function forcesOf(file) {
     return [Number(row.frame), row];
   }));
 }
+
+/** A viewer without a page (RFC 6455, unmasked frames in, masked ones out). */
+export async function connect(port, view) {
+  const socket = net.connect(port, '127.0.0.1');
+  const lines = Object.entries({Host: `127.0.0.1:${port}`, ...upgrade}).map(([name, value]) => `${name}: ${value}\r\n`);
+  socket.write(`GET /live HTTP/1.1\r\n${lines.join('')}\r\n`);
+  const send = (message, opcode = 1) => {
+    const text = Buffer.from(typeof message === 'string' ? message : JSON.stringify(message));
+    const size = text.length < 126 ? Buffer.from([0x80 | text.length]) : Buffer.from([0x80 | 126, text.length >> 8, text.length & 255]);
+    socket.write(Buffer.concat([Buffer.from([0x80 | opcode]), size, Buffer.alloc(4), text]));
+  };
+  const listeners = new Set();
+  let bytes = Buffer.alloc(0), isOpen = false, opened;
+  const ready = new Promise((resolve) => { opened = resolve; });
+  const take = () => {
+    if (!isOpen) {
+      const end = bytes.indexOf('\r\n\r\n');
+      if (end < 0) return;
+      bytes = bytes.subarray(end + 4);
+      isOpen = true;
+      opened();
+    }
+    while (bytes.length >= 2) {
+      const short = bytes[1] & 127, head = short < 126 ? 2 : short === 126 ? 4 : 10;
+      if (bytes.length < head) return;
+      const size = short < 126 ? short : short === 126 ? bytes.readUInt16BE(2) : Number(bytes.readBigUInt64BE(2));
+      if (bytes.length < head + size) return;
+      const opcode = bytes[0] & 15, content = bytes.subarray(head, head + size);
+      bytes = bytes.subarray(head + size);
+      if (opcode === 9) send(content.toString(), 10);
+      if (opcode === 1) for (const listener of [...listeners]) listener(JSON.parse(content.toString()));
+    }
+  };
+  socket.on('data', (part) => {
+    bytes = bytes.length ? Buffer.concat([bytes, part]) : part;
+    take();
+  });
+  socket.on('error', () => undefined);
+  await ready;
+  send({view});
+  const until = (holds) =>
+    new Promise((resolve) => {
+      const listener = (message) => {
+        if (!holds(message)) return;
+        listeners.delete(listener);
+        resolve(message);
+      };
+      listeners.add(listener);
+    });
+  let next = 1;
+  return {
+    until,
+    close: () => socket.destroy(),
+    ask: async (what, fields = {}) => {
+      const id = next++;
+      const reply = until((message) => message.reply === id);
+      send({id, ask: what, ...fields});
+      const {error} = await reply;
+      if (error) throw new Error(error);
+    },
+  };
+}

@@ -146,6 +146,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
     timeout.keep_alive_pings = true;
     socket_.set_option(timeout);
     socket_.read_message_max(kLongestMessage);
+    socket_.auto_fragment(false);
     socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
       if (error) return;
       self->hub_.viewers.insert(self);

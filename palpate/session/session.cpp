@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -24,6 +25,10 @@ namespace palpate {
 namespace {
 
 constexpr size_t kMostEditsKept = 500;
+
+bool is_passed_over(const ForceEstimate& estimate) {
+  return std::find(estimate.warnings.begin(), estimate.warnings.end(), "frame_passed_over") != estimate.warnings.end();
+}
 
 std::string text_of_file(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
@@ -295,8 +300,12 @@ struct Session::State {
     std::optional<RunFrame> frame = run->next();
     if (frame) {
       const ForceEstimate& estimate = frame->estimate;
-      for (const std::string& warning : estimate.warnings) now.run->passed_over += warning == "frame_passed_over";
       rows->add(run->files().rows.back());
+      if (is_passed_over(estimate)) {
+        // It tells nothing: what is shown stays until a frame has been looked at.
+        ++now.run->passed_over;
+        return publish();
+      }
       if (shapes) keep_shape([&] { shapes->write(estimate); });
       now.run->shown = std::make_shared<const RunFrame>(std::move(*frame));
       now.run->shown_ns = steady_ns();

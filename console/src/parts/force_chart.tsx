@@ -2,7 +2,7 @@ import {useEffect, useRef, useState} from 'preact/hooks';
 import uPlot from 'uplot';
 import {type Row, wasLookedAt} from '../model/types';
 
-const kWindow_s = 10;
+const kWindow_s = 10, kLegend_px = 26;
 
 interface Props {
   rows: Row[];
@@ -139,8 +139,7 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
     made.over.addEventListener('dblclick', () => setFollows(true));
     made.over.addEventListener('click', (event) => chosen.current?.(made.posToVal(event.offsetX, 'x')));
     const fit = new ResizeObserver(() => {
-      const legend = host.querySelector<HTMLElement>('.u-legend')?.offsetHeight ?? 0;
-      made.setSize({width: host.clientWidth, height: Math.max(90, host.clientHeight - legend)});
+      made.setSize({width: host.clientWidth, height: Math.max(60, host.clientHeight - kLegend_px)});
     });
     fit.observe(host);
     return () => {

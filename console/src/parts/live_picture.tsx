@@ -35,7 +35,7 @@ export function LivePicture() {
   const label = !connected
     ? 'no connection'
     : run?.over
-      ? `ended at frame ${run.frame ?? 0} — not live`
+      ? `ended at frame ${live.picture?.frame ?? 0} — not live`
       : Number.isFinite(age)
         ? `frozen for ${(age / 1000).toFixed(1)} s`
         : 'no picture yet';
