@@ -40,7 +40,7 @@ bool RootFolder::holds(const std::filesystem::path& file) const {
 
 std::filesystem::path RootFolder::inside(const std::string& relative) const {
   const bool is_text = std::none_of(relative.begin(), relative.end(), [](char c) { return c == '\0'; });
-  const std::filesystem::path file = (folder_ / relative).lexically_normal();
+  std::filesystem::path file = (folder_ / relative).lexically_normal();
   if (!is_text || !holds(file))
     throw BadInput(
         fmt::format("'{}' is outside of the folder that this page may open, {}", relative, folder_.string()));

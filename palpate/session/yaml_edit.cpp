@@ -125,7 +125,7 @@ std::string replaced(const std::string& text, TextSpan span, const std::string& 
 std::string nested(const std::vector<std::string>& path, size_t depth, const std::string& value) {
   std::string text = value;
   for (size_t i = path.size(); i > depth + 1; --i)
-    text = path[i - 1] == "+" ? "[" + text + "]" : fmt::format("{{{}: {}}}", path[i - 1], text);
+    text = path[i - 1] == "+" ? fmt::format("[{}]", text) : fmt::format("{{{}: {}}}", path[i - 1], text);
   return text;
 }
 

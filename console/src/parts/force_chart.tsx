@@ -30,6 +30,15 @@ function dataOf(all: Row[]): uPlot.AlignedData {
   ];
 }
 
+/** Without a pointer over it the chart reads out a moment, or the last value. */
+function readOut(u: uPlot, time_s: number | undefined) {
+  const times = u.data[0];
+  if ((u.cursor.left ?? -1) >= 0 || times.length === 0) return;
+  let idx = times.length - 1;
+  if (time_s !== undefined) times.forEach((time, i) => Math.abs(time - time_s) < Math.abs(times[idx]! - time_s) && (idx = i));
+  u.setLegend({idx}, false);
+}
+
 /** Shows this part of the time, and forces up to the highest in it. */
 function zoom(u: uPlot, min: number, max: number) {
   let most = 0;
@@ -157,8 +166,13 @@ export function ForceChart({rows, unit, isLive, at_s, choose}: Props) {
     if (!follows.current) made.redraw();
     else if (isLive) zoom(made, Math.max(begin, end - kWindow_s), Math.max(end, begin + 1));
     else zoom(made, begin, Math.max(end, begin + 0.1));
+    readOut(made, moment.current);
   }, [rows, isLive, isFollowing, unit]);
-  useEffect(() => plot.current?.redraw(false), [at_s]);
+  useEffect(() => {
+    if (!plot.current) return;
+    plot.current.redraw(false);
+    readOut(plot.current, at_s);
+  }, [at_s]);
 
   const saveCsv = () => {
     const {min, max} = plot.current!.scales['x']!;
