@@ -140,10 +140,11 @@ try {
     await shot('ended');
     const rows = forcesOf(join(root, 'runs/scene/forces.csv'));
     assert.equal(rows.size, 110);
+    await page.waitForFunction(() => window.seen.some(([frame]) => frame === 109));
     const seen = await page.evaluate(() => window.seen);
     const frames = new Set(seen.map(([frame]) => frame));
-    // How many are seen is a matter of the machine; the last one always is.
-    assert(frames.size > 3 && frames.has(109), `only ${frames.size} frames were shown`);
+    // How many are seen is a matter of the machine.
+    assert(frames.size > 3, `only ${frames.size} frames were shown`);
     for (const [frame, text] of seen) {
       const row = rows.get(frame), isKnown = !['tool_lost', 'not_converged'].includes(row.status);
       assert.equal(text, isKnown ? Number(row.force_N).toFixed(2) : '–', `frame ${frame}`);

@@ -23,7 +23,7 @@ json parse(const std::string& text) {
     depth = std::max(depth, now);
     return now <= kMostDeep;
   };
-  const json parsed = json::parse(text, not_too_deep, false);
+  json parsed = json::parse(text, not_too_deep, false);
   if (parsed.is_discarded() || depth > kMostDeep || !parsed.is_object())
     throw BadInput("the message is no JSON object");
   return parsed;
