@@ -11,6 +11,7 @@
 
 #include "bench/accuracy/instrument_pictures.h"
 #include "palpate/instrument/instrument_finder.h"
+#include "palpate/instrument/way_choice.h"
 #include "palpate/stereo/recording.h"
 
 // How well instruments are found, goal beside measured: `bench_instruments [WAY ...] [--view FOLDER]` with the ways
@@ -145,12 +146,13 @@ void consecutive(const Bench& bench) {
   if (videos.empty()) fmt::print("No consecutive real frames in PALPATE_INSTRUMENT_PICTURES.\n");
   for (const RealVideo& video : videos) {
     InstrumentFinder finder(bench.options(), video.frames.front(), {});
+    WayChoice way;
     std::optional<cv::Point2d> last;
     int lost = 0, jumps = 0;
     std::vector<double> milliseconds;
     for (const cv::Mat& frame : video.frames) {
       const auto begin = std::chrono::steady_clock::now();
-      const auto found = find_instruments(finder.find(frame).mask, finder.picture_area());
+      const auto found = find_instruments(find_instruments_in({frame}, {&finder}, way)[0].mask, finder.picture_area());
       milliseconds.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
       std::optional<cv::Point2d> nearest;

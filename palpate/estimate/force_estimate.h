@@ -41,8 +41,8 @@ struct ForceEstimate {
   double max_von_mises_kPa = 0;
   double residual = 0;
   double misfit_mm = 0;
-  ForceBand band;        ///< from the images, at the stated tissue
-  ForceBand total_band;  ///< with what is not known of the tissue
+  ForceBand band;                ///< from the images, at the stated tissue
+  ForceBand total_band;          ///< with what is not known of the tissue
   ForceCorrelation correlation;  ///< where the band comes from
   Hold grip = Hold::free;
   double p_contact = 0;

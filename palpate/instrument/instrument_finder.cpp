@@ -10,8 +10,6 @@ namespace palpate {
 namespace {
 
 constexpr double kDoubtOfColours = 0.2;  // what the colour model says is so with this probability not so
-constexpr double kAgreed = 0.75;         // overlap with the network from which on the colours draw the outline
-constexpr double kAgreementRate = 0.2;   // by which one image changes what is known of it
 constexpr double kSurelyNot = 1e-4;      // probability
 constexpr double kSmallest = 0.004;      // of the image; what is smaller is a highlight, a pin or a clip
 constexpr double kFromBorder = 0.1;  // of the image's width, in which an instrument begins, if its shaft is too dark
@@ -42,10 +40,6 @@ cv::Mat instruments_of(const cv::Mat& mask, const cv::Mat& entrance) {
   return result;
 }
 
-double overlap_of(const cv::Mat& a, const cv::Mat& b) {
-  return static_cast<double>(cv::countNonZero(a & b)) / std::max(1, cv::countNonZero(a | b));
-}
-
 }  // namespace
 
 InstrumentFinder::InstrumentFinder(const InstrumentOptions& options, const cv::Mat& static_bgr,
@@ -57,23 +51,34 @@ InstrumentFinder::InstrumentFinder(const InstrumentOptions& options, const cv::M
   if (model_.picture_area.empty()) model_.picture_area = find_picture_area(static_bgr);
   entrance_ = entrance_of(model_.picture_area);
   if (!looks_ || colours) return;
-  if (ours_)
-    network_.emplace(static_bgr.size());
-  else
+  if (!ours_) {
     network_.emplace(options.segmentation, options.network, static_bgr.size());
+    return;
+  }
+  network_.emplace(static_bgr.size());
+  const cv::Mat likely = network_->probability(static_bgr);
+  cv::resize(model_.picture_area, area_of_network_, likely.size(), 0, 0, cv::INTER_NEAREST);
+  cv::resize(entrance_, entrance_of_network_, likely.size(), 0, 0, cv::INTER_NEAREST);
+  cv::Mat small;
+  cv::resize(static_bgr, small, likely.size(), 0, 0, cv::INTER_AREA);
+  still_ = StillParts(small, corrected(static_bgr, likely) > 0.5);
 }
 
 /// What our network says, corrected by the colours of the picture: what is grey, and what looks like the instruments
-/// that were found, is one sooner than the network believes.
+/// that were found, is one sooner than the network believes; what was none in the static frame is none.
 cv::Mat InstrumentFinder::corrected(const cv::Mat& bgr, const cv::Mat& probability) const {
-  cv::Mat small, entrance;
+  cv::Mat small;
   cv::resize(bgr, small, probability.size(), 0, 0, cv::INTER_AREA);
-  cv::resize(entrance_, entrance, probability.size(), 0, 0, cv::INTER_NEAREST);
+  const auto instruments = [&](const cv::Mat& likely) {
+    return still_.left_out_of(instruments_of(likely > 0.5, entrance_of_network_), small, area_of_network_);
+  };
   cv::Mat likely = grey_counted_in(small, probability);
-  const cv::Mat found = instruments_of(likely > 0.5, entrance);
-  if (cv::countNonZero(found) == 0) return likely;
+  const cv::Mat found = instruments(likely);
   likely.setTo(kSurelyNot, (likely > 0.5) & ~found);
-  return ExampleColours::of_found(small, found).counted_in(small, likely);
+  if (cv::countNonZero(found) == 0) return likely;
+  likely = ExampleColours::of_found(small, found).counted_in(small, likely);
+  likely.setTo(kSurelyNot, (likely > 0.5) & ~instruments(likely));
+  return likely;
 }
 
 /// What is known without an example.
@@ -92,23 +97,21 @@ ExampleColours InstrumentFinder::learn(const cv::Mat& bgr, const cv::Mat& exampl
 
 FoundInstruments InstrumentFinder::find_by_colours(const cv::Mat& bgr) {
   forget_what_left(bgr, model_);
-  return {segment_instrument(bgr, model_), {}};
+  return {segment_instrument(bgr, model_), {}, {}};
 }
 
-FoundInstruments InstrumentFinder::find(const cv::Mat& bgr) {
-  if (!looks_) return {cv::Mat::zeros(bgr.size(), CV_8U), {}};
-  if (!network_ && !example_) return find_by_colours(bgr);
+FoundInstruments InstrumentFinder::find_by_network(const cv::Mat& bgr) const {
   FoundInstruments found;
   found.likeness = follow_edges(bgr, example_ ? example_->counted_in(bgr, probability(bgr)) : probability(bgr));
   found.mask = instruments_of(found.likeness >= 128, entrance_);
   found.likeness.setTo(0, ~found.mask & (found.likeness >= 128));
-  if (!ours_ || example_) return found;
-  const FoundInstruments by_colours = find_by_colours(bgr);
-  if (cv::countNonZero(found.mask) > 0 && cv::countNonZero(by_colours.mask) > 0)
-    agreement_ = agreement_ < 0
-                     ? overlap_of(found.mask, by_colours.mask)
-                     : (1 - kAgreementRate) * agreement_ + kAgreementRate * overlap_of(found.mask, by_colours.mask);
-  return agreement_ > kAgreed ? by_colours : found;
+  found.still = still_.in(bgr);
+  return found;
+}
+
+FoundInstruments InstrumentFinder::find(const cv::Mat& bgr) {
+  if (!looks_) return {cv::Mat::zeros(bgr.size(), CV_8U), {}, {}};
+  return network_ || example_ ? find_by_network(bgr) : find_by_colours(bgr);
 }
 
 ImageLayers InstrumentFinder::layers(const cv::Mat& bgr, const cv::Rect& region, const FoundInstruments& found) const {

@@ -7,23 +7,29 @@
 #include "palpate/instrument/patch_cells.h"
 #include "palpate/instrument/segment.h"
 #include "palpate/instrument/segmentation_network.h"
+#include "palpate/instrument/still_parts.h"
 
 namespace palpate {
 
-/// What one eye shows of instruments.
+/// What one camera shows of instruments.
 struct FoundInstruments {
   cv::Mat mask;      ///< 255 = instrument
   cv::Mat likeness;  ///< 8-bit, 128 at the edge; empty: the colours tell
+  cv::Mat still;     ///< 255 = an instrument of the static frame that still shows; smaller; empty: not known
 };
 
-/// Finds instruments in the images of one eye in the way that the options choose. Our network knows more kinds of
-/// pictures than the colours do, which in turn draw the sharper outline: they do so while both find the same.
+/// Finds instruments in the images of one camera in the way that the options choose.
 class InstrumentFinder {
  public:
   /// `static_bgr`: rectified, of the map frame; `organ_mask`: 255 = surely tissue in it; may be empty.
   InstrumentFinder(const InstrumentOptions& options, const cv::Mat& static_bgr, const cv::Mat& organ_mask);
 
+  /// In the way of the options; with our network, in that alone.
   FoundInstruments find(const cv::Mat& bgr);
+  /// Whether our network and the colours are both to be asked (`WayChoice`).
+  bool has_both_ways() const { return ours_ && !example_; }
+  FoundInstruments find_by_colours(const cv::Mat& bgr);
+  FoundInstruments find_by_network(const cv::Mat& bgr) const;
   /// The colours of the instrument on which `example` (255) lies in this image.
   ExampleColours learn(const cv::Mat& bgr, const cv::Mat& example) const;
   /// From now on these colours count too.
@@ -38,11 +44,10 @@ class InstrumentFinder {
   cv::Mat entrance_;  ///< 255 near the border of the picture
   std::optional<SegmentationNetwork> network_;
   std::optional<ExampleColours> example_;
+  StillParts still_;                               ///< at the size of our network
+  cv::Mat area_of_network_, entrance_of_network_;  ///< the same
   bool looks_ = true;
-  bool ours_ = false;      ///< the network
-  double agreement_ = -1;  ///< overlap of what our network and the colours found so far; negative: not known
-
-  FoundInstruments find_by_colours(const cv::Mat& bgr);
+  bool ours_ = false;  ///< the network
 
   cv::Mat corrected(const cv::Mat& bgr, const cv::Mat& probability) const;
   cv::Mat probability(const cv::Mat& bgr) const;

@@ -7,11 +7,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
 #include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/instrument_finder.h"
 #include "palpate/instrument/tip_tracker.h"
+#include "palpate/instrument/way_choice.h"
 
 namespace palpate {
 
@@ -25,6 +27,7 @@ constexpr double kTurnedShaft = 0.7;    // cosine
 constexpr double kNotSeen_px = 1000;    // what it costs that an eye does not show an instrument
 constexpr double kNotOneTip_px = 600;   // and that the eyes show what cannot be one tip
 constexpr double kNever_px = 1e6;
+constexpr double kAtRest = 0.9;         // share of an instrument's end that shows as in the static frame
 constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
 
 /// One eye in one frame.
@@ -69,6 +72,20 @@ double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& ex
   return static_cast<double>(on) / kSteps;
 }
 
+/// Whether the end of an instrument shows as it did in the static frame. At rest since then, it exerts no force that
+/// could be told, and may be no instrument.
+bool rests(const ImageInstrument& instrument, const FoundInstruments& found) {
+  if (found.still.empty()) return false;
+  const double scale = static_cast<double>(found.still.cols) / found.mask.cols;
+  cv::Mat end = cv::Mat::zeros(found.mask.size(), CV_8U), small;
+  instrument.mask.copyTo(end(instrument.box));
+  cv::Mat near_tip = cv::Mat::zeros(found.mask.size(), CV_8U);
+  cv::circle(near_tip, instrument.tip.tip_px, static_cast<int>(std::max(1 / scale, instrument.tip.width_px)), 255,
+             cv::FILLED);
+  cv::resize(end & near_tip, small, found.still.size(), 0, 0, cv::INTER_NEAREST);
+  return cv::countNonZero(small & found.still) >= kAtRest * std::max(1, cv::countNonZero(small));
+}
+
 }  // namespace
 
 struct InstrumentTracker::State {
@@ -77,6 +94,7 @@ struct InstrumentTracker::State {
   int example_frame = 0;
   RowOffset rows;
   std::vector<InstrumentFinder> finders;  ///< one for each eye
+  WayChoice way;
   std::vector<TipTrack> tracks;
   std::function<std::optional<TipTrack::Row>()> live_tip;
   double time_offset_s = 0;
@@ -86,7 +104,7 @@ struct InstrumentTracker::State {
   std::optional<double> last_time_s;
 
   std::optional<TipTrack::Row> row_of(const TipTrack& track, const RectifiedPair& pair) const;
-  SeenByEye see(const cv::Mat& bgr, size_t eye);
+  std::array<FoundInstruments, 2> find(const RectifiedPair& pair);
   std::optional<ImageTip> expected(size_t tracker, size_t eye, double seconds) const;
   void follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const;
   std::array<bool, kMostInstruments> part_touching(std::array<SeenByEye, 2>& seen, double seconds) const;
@@ -105,12 +123,15 @@ std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& tr
   return row->second;
 }
 
-SeenByEye InstrumentTracker::State::see(const cv::Mat& bgr, size_t eye) {
-  SeenByEye seen;
-  seen.of_tracker.fill(-1);
-  seen.found = finders[eye].find(bgr);
-  seen.instruments = find_instruments(seen.found.mask, finders[eye].picture_area());
-  return seen;
+std::array<FoundInstruments, 2> InstrumentTracker::State::find(const RectifiedPair& pair) {
+  std::array<FoundInstruments, 2> found;
+  std::vector<cv::Mat> images;
+  std::vector<InstrumentFinder*> looking;
+  if (!pair.left.empty()) images.push_back(pair.left), looking.push_back(&finders[0]);
+  if (!pair.right.empty()) images.push_back(pair.right), looking.push_back(&finders[1]);
+  const std::vector<FoundInstruments> shown = find_instruments_in(images, looking, way);
+  for (size_t i = 0; i < shown.size(); ++i) found[looking[i] == &finders[0] ? 0 : 1] = shown[i];
+  return found;
 }
 
 std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_t eye, double seconds) const {
@@ -211,7 +232,7 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
   bool beside_another = std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
   bool asks = false;
   for (size_t l = 0; l < seen[0].instruments.size(); ++l) {
-    if (is_given(seen[0], l)) continue;
+    if (is_given(seen[0], l) || rests(seen[0].instruments[l], seen[0].found)) continue;
     const ImageTip& left = seen[0].instruments[l].tip;
     std::optional<size_t> partner;
     double least = std::numeric_limits<double>::max();
@@ -327,9 +348,13 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
     const ExampleColours colours = s.finders[0].learn(pair.left, s.example);
     for (InstrumentFinder& finder : s.finders) finder.use(colours);
   }
+  std::array<FoundInstruments, 2> found = s.find(pair);
   std::array<SeenByEye, 2> seen;
   const auto see = [&](size_t eye) {
-    if (!images[eye]->empty()) seen[eye] = s.see(*images[eye], eye);
+    seen[eye].of_tracker.fill(-1);
+    seen[eye].found = found[eye];
+    if (!found[eye].mask.empty())
+      seen[eye].instruments = find_instruments(found[eye].mask, s.finders[eye].picture_area());
   };
   tbb::parallel_invoke([&] { see(0); }, [&] { see(1); });
   observations.left_mask = seen[0].found.mask;

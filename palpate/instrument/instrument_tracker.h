@@ -22,14 +22,14 @@ inline constexpr size_t kMostInstruments = 2;
 
 /// `instrument` of the scene file.
 struct InstrumentOptions {
-  std::filesystem::path segmentation = "colour";  ///< learned, colour, none (in no image) or the user's network
-  NetworkOptions network;                         ///< of the user's network
-  std::vector<cv::Point2d> example_px;            ///< outline of an instrument's shaft, left image as recorded
-  int at_frame = 0;                               ///< in which the example lies
-  std::filesystem::path track;                    ///< tip.csv instead of the images
-  std::filesystem::path track_2;                  ///< the same for the second instrument
-  CameraFromRobot camera_from_robot;              ///< axes of the tracks
-  double time_offset_s = 0;                       ///< track time minus video time; 0: rows are found by frame number
+  std::filesystem::path segmentation = "learned";  ///< learned, colour, none (in no image) or the user's network
+  NetworkOptions network;                          ///< of the user's network
+  std::vector<cv::Point2d> example_px;             ///< outline of an instrument's shaft, left image as recorded
+  int at_frame = 0;                                ///< in which the example lies
+  std::filesystem::path track;                     ///< tip.csv instead of the images
+  std::filesystem::path track_2;                   ///< the same for the second instrument
+  CameraFromRobot camera_from_robot;               ///< axes of the tracks
+  double time_offset_s = 0;                        ///< track time minus video time; 0: rows are found by frame number
   /// Of a live track (`track: openigtlink:...`): the tip now, left camera frame; nothing while none is known. Set by
   /// who listens to it.
   std::function<std::optional<TipTrack::Row>()> live_tip;
