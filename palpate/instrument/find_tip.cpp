@@ -43,6 +43,7 @@ struct ShaftShape {
   double straight;  ///< most deviation of the edges from straight lines, in widths
   double taper;     ///< most that they come together, per length
 };
+constexpr ShaftShape kShaft{0.14, 0.45};      // a straight one, without wrist and jaws
 constexpr ShaftShape kVetted{0.3, 1.2};       // of a mask whose parts are instruments: near ones taper, wrists bend
 constexpr ShaftShape kByColours{0.09, 0.45};  // of a mask that nothing but colours has made
 constexpr double kGapWidths = 3;    // between the border and what is seen of an instrument whose shaft is too dark
@@ -297,9 +298,10 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
     axis = cv::Point2d(axis.x * std::cos(turn) - axis.y * std::sin(turn),
                        axis.x * std::sin(turn) + axis.y * std::cos(turn));
   }
-  if (!looks_like_an_instrument(shaft, farthest, shape)) {
-    shaft = fit_shaft(slices, kSleeveShare);
-    if (!has_rod(slices, shaft)) return {};
+  const ShaftShape& strict = shape.straight < kShaft.straight ? shape : kShaft;
+  if (!looks_like_an_instrument(shaft, farthest, strict)) {
+    const Shaft sleeve = fit_shaft(slices, kSleeveShare);
+    if (has_rod(slices, sleeve) && looks_like_an_instrument(sleeve, farthest, strict)) shaft = sleeve;
   }
   if (!looks_like_an_instrument(shaft, farthest, shape) || at_two_places(entering, shaft.width)) return {};
 
