@@ -27,7 +27,7 @@ constexpr double kTurnedShaft = 0.7;    // cosine
 constexpr double kNotSeen_px = 1000;    // what it costs that an eye does not show an instrument
 constexpr double kNotOneTip_px = 600;   // and that the eyes show what cannot be one tip
 constexpr double kNever_px = 1e6;
-constexpr double kAtRest = 0.9;         // share of an instrument's end that shows as in the static frame
+constexpr double kAtRest = 0.9;         // fraction of an instrument's end that shows as in the static frame
 constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
 
 /// One eye in one frame.

@@ -74,18 +74,26 @@ std::vector<FoundInstruments> find_instruments_in(const std::vector<cv::Mat>& bg
     each([&](size_t i) { found[i] = finders[i]->find(bgr[i]); });
     return found;
   }
-  if (!way.compares()) {
+  std::vector<BothWays> both(bgr.size());
+  const auto by_colours = [&](size_t i) { both[i].by_colours = finders[i]->find_by_colours(bgr[i]); };
+  const auto by_network = [&](size_t i) { both[i].by_network = finders[i]->find_by_network(bgr[i]); };
+  const auto chosen = [&](size_t i) { return way.by_colours() ? both[i].by_colours : both[i].by_network; };
+  const bool one_first = !way.compares(), colours_first = way.by_colours();
+  if (one_first) {
     each([&](size_t i) {
-      found[i] = way.by_colours() ? finders[i]->find_by_colours(bgr[i]) : finders[i]->find_by_network(bgr[i]);
+      colours_first ? by_colours(i) : by_network(i);
+      found[i] = chosen(i);
     });
     if (way.suffices(found)) return found;
   }
-  std::vector<BothWays> both(bgr.size());
-  each([&](size_t i) { both[i] = {finders[i]->find_by_colours(bgr[i]), finders[i]->find_by_network(bgr[i])}; });
+  each([&](size_t i) {
+    if (!one_first || !colours_first) by_colours(i);
+    if (!one_first || colours_first) by_network(i);
+  });
   std::vector<cv::Mat> areas;
   for (const InstrumentFinder* finder : finders) areas.push_back(finder->picture_area());
   way.compare(both, areas);
-  for (size_t i = 0; i < bgr.size(); ++i) found[i] = way.by_colours() ? both[i].by_colours : both[i].by_network;
+  for (size_t i = 0; i < bgr.size(); ++i) found[i] = chosen(i);
   return found;
 }
 
