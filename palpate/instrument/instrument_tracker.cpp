@@ -7,11 +7,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
 #include "palpate/instrument/find_tip.h"
 #include "palpate/instrument/instrument_finder.h"
+#include "palpate/instrument/still_parts.h"
 #include "palpate/instrument/tip_tracker.h"
 #include "palpate/instrument/way_choice.h"
 
@@ -27,7 +27,6 @@ constexpr double kTurnedShaft = 0.7;    // cosine
 constexpr double kNotSeen_px = 1000;    // what it costs that an eye does not show an instrument
 constexpr double kNotOneTip_px = 600;   // and that the eyes show what cannot be one tip
 constexpr double kNever_px = 1e6;
-constexpr double kAtRest = 0.9;         // fraction of an instrument's end that shows as in the static frame
 constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
 
 /// One eye in one frame.
@@ -70,20 +69,6 @@ double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& ex
     on += cv::Rect({}, mask.size()).contains(at) && mask.at<uchar>(at) != 0;
   }
   return static_cast<double>(on) / kSteps;
-}
-
-/// Whether the end of an instrument shows as it did in the static frame. At rest since then, it exerts no force that
-/// could be told, and may be no instrument.
-bool rests(const ImageInstrument& instrument, const FoundInstruments& found) {
-  if (found.still.empty()) return false;
-  const double scale = static_cast<double>(found.still.cols) / found.mask.cols;
-  cv::Mat end = cv::Mat::zeros(found.mask.size(), CV_8U), small;
-  instrument.mask.copyTo(end(instrument.box));
-  cv::Mat near_tip = cv::Mat::zeros(found.mask.size(), CV_8U);
-  cv::circle(near_tip, instrument.tip.tip_px, static_cast<int>(std::max(1 / scale, instrument.tip.width_px)), 255,
-             cv::FILLED);
-  cv::resize(end & near_tip, small, found.still.size(), 0, 0, cv::INTER_NEAREST);
-  return cv::countNonZero(small & found.still) >= kAtRest * std::max(1, cv::countNonZero(small));
 }
 
 }  // namespace
@@ -232,7 +217,7 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
   bool beside_another = std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
   bool asks = false;
   for (size_t l = 0; l < seen[0].instruments.size(); ++l) {
-    if (is_given(seen[0], l) || rests(seen[0].instruments[l], seen[0].found)) continue;
+    if (is_given(seen[0], l) || rests(seen[0].instruments[l], seen[0].found.mask.size(), seen[0].found.still)) continue;
     const ImageTip& left = seen[0].instruments[l].tip;
     std::optional<size_t> partner;
     double least = std::numeric_limits<double>::max();

@@ -1,14 +1,14 @@
 #include "palpate/instrument/still_parts.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-
-#include "palpate/instrument/find_tip.h"
 
 namespace palpate {
 namespace {
 
 constexpr double kMoves = 0.02;    // of the image's width, by which tissue moves
+constexpr double kAtRest = 0.9;    // fraction of an end that shows as before
 constexpr double kUnchanged = 24;  // grey levels
 
 }  // namespace
@@ -45,6 +45,17 @@ cv::Mat StillParts::left_out_of(const cv::Mat& mask, const cv::Mat& bgr, const c
       result.setTo(0, part & same);
   }
   return result;
+}
+
+bool rests(const ImageInstrument& instrument, cv::Size image, const cv::Mat& still) {
+  if (still.empty()) return false;
+  cv::Mat end = cv::Mat::zeros(image, CV_8U), near_tip = cv::Mat::zeros(image, CV_8U), small;
+  instrument.mask.copyTo(end(instrument.box));
+  const double pixel_of_still = static_cast<double>(image.width) / still.cols;
+  const int radius_px = static_cast<int>(std::max(pixel_of_still, instrument.tip.width_px));
+  cv::circle(near_tip, instrument.tip.tip_px, radius_px, 255, cv::FILLED);
+  cv::resize(end & near_tip, small, still.size(), 0, 0, cv::INTER_NEAREST);
+  return cv::countNonZero(small & still) >= kAtRest * std::max(1, cv::countNonZero(small));
 }
 
 }  // namespace palpate

@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "palpate/instrument/find_tip.h"
+
 namespace palpate {
 
 /// What was taken for an instrument in the static frame: also shadows, dark organs, gauze.
@@ -22,5 +24,10 @@ class StillParts {
   cv::Mat darkest_, brightest_;  ///< of the colours nearby, by channel; empty: nothing is still
   cv::Mat nearby_;               ///< 255 where there are any
 };
+
+/// Whether the end of an instrument, in an image of this size, shows as in the static frame; `still` as of
+/// `StillParts::in`, never where it is empty. At rest since then, it exerts no force that could be told, and may be no
+/// instrument.
+bool rests(const ImageInstrument& instrument, cv::Size image, const cv::Mat& still);
 
 }  // namespace palpate

@@ -61,6 +61,24 @@ TEST(StillParts, AnInstrumentIsPartedFromTheShadowThatItPasses) {
   EXPECT_LT(cv::countNonZero(left & ~shaft), 0.05 * cv::countNonZero(mask));
 }
 
+TEST(StillParts, AnInstrumentRestsUntilItsEndMoves) {
+  cv::Mat image = tissue(), mask = blank();
+  draw_shaft(image, {140, 140, 140});
+  draw_shaft(mask, 255);
+  const StillParts still(image, mask);
+  const auto before = find_instruments(mask, kAll);
+  ASSERT_EQ(before.size(), 1U);
+  EXPECT_TRUE(rests(before[0], kSize, still.in(image)));
+  EXPECT_FALSE(rests(before[0], kSize, {})) << "nothing is known of the static frame";
+
+  cv::Mat later = tissue(), moved = blank();
+  cv::line(later, {319, 60}, {140, 96}, {140, 140, 140}, 22);
+  cv::line(moved, {319, 60}, {140, 96}, 255, 22);
+  const auto after = find_instruments(moved, kAll);
+  ASSERT_EQ(after.size(), 1U);
+  EXPECT_FALSE(rests(after[0], kSize, still.in(later)));
+}
+
 TEST(StillParts, NothingIsLeftOutWhereNothingWasFoundBefore) {
   cv::Mat mask = blank();
   draw_shadow(mask, 255);
