@@ -23,14 +23,16 @@ constexpr double kNegligible_mm = 1e-4;
 
 }  // namespace
 
-BorderedSystem::BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J) : J_(J) {
+BorderedSystem::BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J,
+                               const std::vector<int>& order)
+    : J_(J) {
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * model.node_count());
   model.tangent(rest, false, K_);
   rho_ = kConstraintWeight * K_.diagonal().mean();
   const Eigen::SparseMatrix<double> full = rho_ * (J.transpose() * J);
   JtJ_ = full.triangularView<Eigen::Lower>();
   A_ = K_ + JtJ_;
-  factor_.analyze(A_);
+  factor_.analyze(A_, order);
   JJt_.compute(Eigen::MatrixXd(J * J.transpose()));
 }
 
@@ -51,6 +53,10 @@ bool BorderedSystem::factorize(const TetModel& model, const Eigen::VectorXd& u) 
 
 bool BorderedSystem::stale() const {
   return gradients_ > kStaleGradients;
+}
+
+bool BorderedSystem::worn() const {
+  return gradients_ > kStaleGradients / 2;
 }
 
 void BorderedSystem::age(int steps) {
@@ -111,17 +117,22 @@ NewtonStep BorderedSystem::solve_at(const TetModel& model, const Eigen::VectorXd
   return step;
 }
 
+BorderedSystem::UnitResponse BorderedSystem::respond(const Eigen::MatrixXd& E) const {
+  const Eigen::MatrixXd on_J = schur_.solve(E);
+  return {Y_ * on_J, E.transpose() * (on_J - rho_ * E)};
+}
+
 BorderedSystem::UnitResponse BorderedSystem::respond(const Eigen::SparseMatrix<double>& R,
                                                      const Eigen::MatrixXd& E) const {
   // K^-1 = A^-1 + Y (1/rho - S)^-1 Y^T with A = K + rho J^T J, Y = A^-1 J^T, S = J Y.
-  const Eigen::MatrixXd S = J_ * Y_;
-  const Eigen::MatrixXd JY_R = Y_.transpose() * R.transpose();
-  const Eigen::MatrixXd without_J = Eigen::MatrixXd::Identity(S.rows(), S.cols()) / rho_ - S;
-  const Eigen::MatrixXd K_inverse_R =
-      factor_.solve(Eigen::MatrixXd(R.transpose())) + Y_ * without_J.partialPivLu().solve(JY_R);
-  const Eigen::MatrixXd compliance = R * K_inverse_R;
+  const Eigen::MatrixXd S = J_ * Y_, RY = R * Y_;
+  const Eigen::PartialPivLU<Eigen::MatrixXd> without_J(Eigen::MatrixXd::Identity(S.rows(), S.cols()) / rho_ - S);
+  const Eigen::MatrixXd W = factor_.half_solve(Eigen::MatrixXd(R.transpose()));
+  const Eigen::MatrixXd compliance = W.transpose() * W + RY * without_J.solve(RY.transpose());
   const Eigen::MatrixXd multipliers = compliance.partialPivLu().solve(E);
-  return {K_inverse_R * multipliers, E.transpose() * multipliers};
+  const Eigen::MatrixXd du =
+      factor_.solve(R.transpose() * multipliers) + Y_ * without_J.solve(RY.transpose() * multipliers);
+  return {du, E.transpose() * multipliers};
 }
 
 Eigen::VectorXd BorderedSystem::times_stiffness(const Eigen::VectorXd& v) const {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCore>
+#include <vector>
 
 #include "palpate/elastic/sparse_factor.h"
 #include "palpate/elastic/tet_model.h"
@@ -18,14 +19,18 @@ struct NewtonStep {
 /// The same solution as with K, but A is positive definite also where the tissue under the tip softens in compression.
 class BorderedSystem {
  public:
-  BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J);
+  /// `order` of elimination: of a system of the same model with other rows; empty = found anew.
+  BorderedSystem(const TetModel& model, const Eigen::SparseMatrix<double>& J, const std::vector<int>& order = {});
 
   /// Factors the stiffness at `u` (every node). False when even the projected tangent cannot be factored.
   bool factorize(const TetModel& model, const Eigen::VectorXd& u);
 
   bool usable() const { return usable_; }
+  std::vector<int> order() const { return factor_.order(); }
   /// The factor is so old that the steps spent on it have cost more than a new one.
   bool stale() const;
+  /// It is half way there.
+  bool worn() const;
   /// Adds to these steps.
   void age(int steps);
 
@@ -49,6 +54,8 @@ class BorderedSystem {
     Eigen::MatrixXd du;     ///< of the unknowns, one column per unit displacement
     Eigen::MatrixXd force;  ///< E^T (R K^-1 R^T)^-1 E, N/mm
   };
+  /// K du + J^T lambda = 0, J du = E.
+  UnitResponse respond(const Eigen::MatrixXd& E) const;
   /// K du + R^T lambda = 0, R du = E for other rows R than J. The factor holds J; the Woodbury identity takes it out.
   UnitResponse respond(const Eigen::SparseMatrix<double>& R, const Eigen::MatrixXd& E) const;
 

@@ -37,6 +37,8 @@ class ContactModel {
 
   size_t contact_count() const;
 
+  /// A contact may begin near here soon: makes the body for it ready in a thread of its own.
+  void expect(const Vec3& place_mm, double radius_mm);
   /// One more contact, the last one, at a place of the surface at rest. The mesh changes.
   void begin(const Vec3& place_mm, double radius_mm);
   /// Ends one contact; those after it move up. The mesh stays.
@@ -49,7 +51,10 @@ class ContactModel {
 
   /// Equilibrium at the displacements q, one for each contact (mm), from the last one.
   Equilibrium solve(const std::vector<Vec3>& q_mm);
-  /// Eq. 3 around the last equilibrium; the stiffness is that of the last factorization.
+  /// Factor and derivatives by radius as of the last equilibrium, for what follows.
+  void refresh();
+  /// Eq. 3 around the last equilibrium; the stiffness is that of the last factorization, the derivatives by radius are
+  /// those of the last `refresh` where nothing else has changed.
   ContactResponse respond(const Equilibrium& equilibrium, const std::vector<Vec3>& q_mm);
 
   const Footprint& footprint(size_t contact) const;

@@ -67,6 +67,7 @@ struct EquilibriumSolver::State {
   std::vector<Contact> contacts;
   Eigen::SparseMatrix<double> J;  // of all contacts
   std::unique_ptr<BorderedSystem> system;
+  std::vector<int> order;  // of elimination
   Secants secants;
   Eigen::VectorXd u;                // unknowns of the last equilibrium
   Eigen::VectorXd lambda;           // its multipliers
@@ -110,8 +111,8 @@ struct EquilibriumSolver::State {
     return target;
   }
 
-  ContactSensitivity sensitivity_of(const Eigen::SparseMatrix<double>& rows,
-                                    const std::vector<Eigen::Index>& rows_of_contact) const;
+  bool is_factored() const { return system && system->usable(); }
+  ContactSensitivity sensitivity_of(const BorderedSystem::UnitResponse& response) const;
 
   /// Everything that hangs on which contacts there are; u stays.
   void tie() {
@@ -120,7 +121,10 @@ struct EquilibriumSolver::State {
     J = stacked(parts, model.unknown_count());
     secants.clear();
     system.reset();
-    if (!contacts.empty()) system = std::make_unique<BorderedSystem>(model, J);
+    if (!contacts.empty()) {
+      system = std::make_unique<BorderedSystem>(model, J, order);
+      order = system->order();
+    }
     lambda = Eigen::VectorXd::Zero(J.rows());
     last_step = earlier_step = {};
   }
@@ -384,17 +388,20 @@ Eigen::MatrixXd unit_displacements(const std::vector<Eigen::Index>& rows_of_cont
 
 }  // namespace
 
-ContactSensitivity EquilibriumSolver::State::sensitivity_of(const Eigen::SparseMatrix<double>& rows,
-                                                            const std::vector<Eigen::Index>& rows_of_contact) const {
+ContactSensitivity EquilibriumSolver::State::sensitivity_of(const BorderedSystem::UnitResponse& response) const {
   ContactSensitivity answer;
-  if (!system || !system->usable()) return answer;
-  const Eigen::MatrixXd E = unit_displacements(rows_of_contact, rows.rows());
-  const BorderedSystem::UnitResponse response = system->respond(rows, E);
-  answer.motion.resize(3 * model.node_count(), E.cols());
-  for (Eigen::Index column = 0; column < E.cols(); ++column)
+  answer.motion.resize(3 * model.node_count(), response.du.cols());
+  for (Eigen::Index column = 0; column < response.du.cols(); ++column)
     answer.motion.col(column) = model.expand(response.du.col(column));
   answer.force = response.force;
   return answer;
+}
+
+void EquilibriumSolver::refresh() {
+  State& s = *state_;
+  if (!s.system || (s.system->usable() && !s.system->worn())) return;
+  ++s.factorizations;
+  s.system->factorize(s.model, s.model.expand(s.u));
 }
 
 int EquilibriumSolver::factorizations() const {
@@ -402,19 +409,24 @@ int EquilibriumSolver::factorizations() const {
 }
 
 ContactSensitivity EquilibriumSolver::sensitivity() const {
+  const State& s = *state_;
+  if (!s.is_factored()) return {};
   std::vector<Eigen::Index> rows_of_contact;
-  for (const State::Contact& contact : state_->contacts) rows_of_contact.push_back(contact.J.rows());
-  return state_->sensitivity_of(state_->J, rows_of_contact);
+  for (const State::Contact& contact : s.contacts) rows_of_contact.push_back(contact.J.rows());
+  return s.sensitivity_of(s.system->respond(unit_displacements(rows_of_contact, s.J.rows())));
 }
 
 ContactSensitivity EquilibriumSolver::sensitivity_with(const std::vector<Footprint>& footprints) const {
+  const State& s = *state_;
+  if (!s.is_factored()) return {};
   std::vector<Eigen::SparseMatrix<double>> parts;
   std::vector<Eigen::Index> rows_of_contact;
   for (const Footprint& footprint : footprints) {
-    parts.push_back(constraint_matrix(state_->model, footprint));
+    parts.push_back(constraint_matrix(s.model, footprint));
     rows_of_contact.push_back(parts.back().rows());
   }
-  return state_->sensitivity_of(stacked(parts, state_->model.unknown_count()), rows_of_contact);
+  const Eigen::SparseMatrix<double> rows = stacked(parts, s.model.unknown_count());
+  return s.sensitivity_of(s.system->respond(rows, unit_displacements(rows_of_contact, rows.rows())));
 }
 
 void EquilibriumSolver::let_go(size_t number) {

@@ -81,6 +81,9 @@ class EquilibriumSolver {
   /// (J K^-1 J^T)^-1 condensed on one displacement of all its samples, by three solves.
   ContactStiffness contact_stiffness();
 
+  /// Factors the stiffness of the last answer where the factor at hand would not serve for long.
+  void refresh();
+
   /// At the state in which the stiffness was factored last, without a further factorization.
   ContactSensitivity sensitivity() const;
   /// The same if the contacts had these footprints instead, one for each.

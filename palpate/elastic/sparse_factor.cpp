@@ -108,6 +108,23 @@ struct SparseFactor::State {
     cholmod_free_factor(&factor, &common);
     cholmod_finish(&common);
   }
+
+  /// `part`: which of CHOLMOD's systems.
+  Eigen::MatrixXd solve(int part, const Eigen::MatrixXd& B) {
+    cholmod_dense view{};
+    view.nrow = static_cast<size_t>(B.rows());
+    view.ncol = static_cast<size_t>(B.cols());
+    view.nzmax = static_cast<size_t>(B.size());
+    view.d = static_cast<size_t>(B.rows());
+    view.x = const_cast<double*>(B.data());
+    view.xtype = CHOLMOD_REAL;
+    view.dtype = CHOLMOD_DOUBLE;
+    cholmod_dense* x = cholmod_solve(part, factor, &view, &common);
+    if (!x) throw std::runtime_error("SparseFactor: solve failed");
+    Eigen::MatrixXd X = Eigen::Map<Eigen::MatrixXd>(static_cast<double*>(x->x), B.rows(), B.cols());
+    cholmod_free_dense(&x, &common);
+    return X;
+  }
 };
 
 SparseFactor::SparseFactor() : state_(std::make_unique<State>()) {}
@@ -115,11 +132,19 @@ SparseFactor::~SparseFactor() = default;
 SparseFactor::SparseFactor(SparseFactor&&) noexcept = default;
 SparseFactor& SparseFactor::operator=(SparseFactor&&) noexcept = default;
 
-void SparseFactor::analyze(const Eigen::SparseMatrix<double>& lower) {
+void SparseFactor::analyze(const Eigen::SparseMatrix<double>& lower, const std::vector<int>& order) {
   cholmod_sparse view = lower_view(lower);
   cholmod_free_factor(&state_->factor, &state_->common);
-  state_->factor = cholmod_analyze(&view, &state_->common);
+  const bool is_given = order.size() == view.nrow;
+  state_->common.method[0].ordering = is_given ? CHOLMOD_GIVEN : CHOLMOD_METIS;
+  state_->factor = is_given ? cholmod_analyze_p(&view, const_cast<int*>(order.data()), nullptr, 0, &state_->common)
+                            : cholmod_analyze(&view, &state_->common);
   if (!state_->factor) throw std::runtime_error("SparseFactor: symbolic analysis failed");
+}
+
+std::vector<int> SparseFactor::order() const {
+  const auto* permutation = static_cast<const int*>(state_->factor->Perm);
+  return {permutation, permutation + state_->factor->n};
 }
 
 bool SparseFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
@@ -139,19 +164,11 @@ Eigen::VectorXd SparseFactor::solve_roughly(const Eigen::VectorXd& b) const {
 }
 
 Eigen::MatrixXd SparseFactor::solve(const Eigen::MatrixXd& B) const {
-  cholmod_dense view{};
-  view.nrow = static_cast<size_t>(B.rows());
-  view.ncol = static_cast<size_t>(B.cols());
-  view.nzmax = static_cast<size_t>(B.size());
-  view.d = static_cast<size_t>(B.rows());
-  view.x = const_cast<double*>(B.data());
-  view.xtype = CHOLMOD_REAL;
-  view.dtype = CHOLMOD_DOUBLE;
-  cholmod_dense* x = cholmod_solve(CHOLMOD_A, state_->factor, &view, &state_->common);
-  if (!x) throw std::runtime_error("SparseFactor: solve failed");
-  Eigen::MatrixXd X = Eigen::Map<Eigen::MatrixXd>(static_cast<double*>(x->x), B.rows(), B.cols());
-  cholmod_free_dense(&x, &state_->common);
-  return X;
+  return state_->solve(CHOLMOD_A, B);
+}
+
+Eigen::MatrixXd SparseFactor::half_solve(const Eigen::MatrixXd& B) const {
+  return state_->solve(CHOLMOD_L, state_->solve(CHOLMOD_P, B));
 }
 
 }  // namespace palpate

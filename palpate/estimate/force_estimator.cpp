@@ -237,6 +237,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   if (answer.equilibrium) s.show(answer, estimate);
   estimate.times.stress_ms = watch.lap_ms();
   for (ForceEstimate& other : estimate.further) other.times = estimate.times;
+  s.filter.look_ahead();
   return estimate;
 }
 

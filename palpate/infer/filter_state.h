@@ -1,5 +1,6 @@
 #pragma once
 
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -21,8 +22,16 @@ struct Hand {
   bool is_confirmed = true;  ///< the tissue of a later frame has said that it holds
   bool is_told = false;      ///< the operator says where it holds; there is no tip
   double onset_s = 0;
+  int frames_expected = 0;           ///< until a touch elsewhere may be expected
   SceneMotion free_scene;            ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();  ///< the offset with which the patch was laid
+};
+
+/// A frame's answer from which radius and place of these instruments' patches are to be laid anew.
+struct Renewal {
+  Belief prior;
+  ContactFit fit;
+  std::vector<size_t> instruments;
 };
 
 /// What ForceFilter keeps from frame to frame, and the steps of a frame.
@@ -45,6 +54,8 @@ struct FilterState {
   std::vector<size_t> instrument_of_contact;
   std::optional<SolvedBody> body;
   std::vector<PatchReach> patches;  ///< as believed before the frame
+  std::optional<Renewal> renewal;   ///< left to `look_ahead`
+  std::future<void> ahead;          ///< the last one: nothing else may be touched until it has ended
 
   FilterState(ContactModel m, const AttachedMesh& map, std::vector<TissuePoint> p, const Rectification& r,
               const ContactOptions& o, const InferenceParameters& q);
@@ -82,6 +93,9 @@ struct FilterState {
   /// of the radius.
   void renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit);
 
+  void look_ahead();
+  void finish_look_ahead();
+
   // answer.cpp: what is told of a frame
   void report(size_t instrument, const ContactFit& fit, const TipObservation& tip, InstrumentAnswer& answer) const;
   /// Median distance between where tissue is seen and where it is predicted, across the viewing ray, mm; and whether it
@@ -91,6 +105,8 @@ struct FilterState {
  private:
   /// The patch where the tip has slid to.
   void follow_slide(size_t instrument);
+  /// Has the body made ready for where a free tip is about to touch.
+  void expect_touch(Hand& hand, const Gap& gap, const Vec3& step_mm, const Vec3& tip_mm);
   Gap gap_of(const Vec3& tip_in_map_mm) const;
   Vec3 place_at_rest(const Gap& gap) const;
   ContactPrior prior_of_touch() const;

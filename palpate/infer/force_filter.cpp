@@ -16,11 +16,17 @@ ForceFilter::~ForceFilter() = default;
 ForceFilter::ForceFilter(ForceFilter&&) noexcept = default;
 
 const ContactModel& ForceFilter::model() const {
+  if (state_->ahead.valid()) state_->ahead.wait();
   return state_->model;
 }
 
-std::vector<TissuePoint> ForceFilter::wanted_points() const {
-  const FilterState& s = *state_;
+void ForceFilter::look_ahead() {
+  state_->ahead = std::async(std::launch::async, [s = state_.get()] { s->look_ahead(); });
+}
+
+std::vector<TissuePoint> ForceFilter::wanted_points() {
+  FilterState& s = *state_;
+  s.finish_look_ahead();
   std::vector<char> is_wanted(s.points.size(), 0);
   for (size_t i : s.even_points) is_wanted[i] = 1;
   for (size_t k = 0; k < s.model.contact_count(); ++k) {
@@ -47,6 +53,7 @@ std::vector<TissuePoint> ForceFilter::wanted_points() const {
 
 FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
   FilterState& s = *state_;
+  s.finish_look_ahead();
   FrameAnswer answer;
   const double seconds = s.begun ? std::clamp(frame.time_s - s.last_time_s, 1e-3, 1.0) : 0.04;
   s.begun = true;
@@ -105,8 +112,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     return hand.contact && hand.filter.most_probable() != Hold::free;
   });
   if (s.body && any_touches) answer.equilibrium = s.body->response.equilibrium;
-  if (fit.converged)
-    for (size_t instrument : std::vector<size_t>(s.instrument_of_contact)) s.renew_patch(instrument, prior, fit);
+  if (fit.converged && s.body) s.renewal = Renewal{prior, fit, s.instrument_of_contact};
   for (size_t i = 0; i < s.hands.size(); ++i) {
     const TipObservation& tip = frame.tips[i];
     Hand& hand = s.hands[i];

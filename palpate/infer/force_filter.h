@@ -74,10 +74,14 @@ class ForceFilter {
 
   /// The points to be followed in the next frame, evenly over the organ and closer around each contact, with the motion
   /// that is expected of them.
-  std::vector<TissuePoint> wanted_points() const;
+  std::vector<TissuePoint> wanted_points();
 
   /// Frames in order of time.
   FrameAnswer update(const FrameEvidence& frame);
+
+  /// After `update`, in a thread of its own until the next frame comes: patches of another radius, the factor and its
+  /// derivatives. Without it the next frame does that first; the answers are the same.
+  void look_ahead();
 
   const ContactModel& model() const;
 

@@ -54,4 +54,20 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Cont
   }
 }
 
+void FilterState::look_ahead() {
+  const bool is_current = renewal && renewal->prior.mean.size() == belief.mean.size();
+  for (size_t i = 0; is_current && i < renewal->instruments.size(); ++i)
+    renew_patch(renewal->instruments[i], renewal->prior, renewal->fit);
+  renewal.reset();
+  if (body) model.refresh();
+}
+
+void FilterState::finish_look_ahead() {
+  if (ahead.valid()) {
+    ahead.get();
+  } else {
+    look_ahead();
+  }
+}
+
 }  // namespace palpate

@@ -5,6 +5,13 @@
 
 namespace palpate {
 
+namespace {
+
+/// The body for a contact is made ready so many frames before the tip would be there, and not anew in less than that.
+constexpr int kExpectedFrames = 4;
+
+}  // namespace
+
 Gap FilterState::gap_of(const Vec3& tip_in_map_mm) const {
   if (!body) return gap_to_surface(tip_in_map_mm, rest_mm, rest_boundary);
   std::vector<Vec3> nodes = model.model().rest_mm();
@@ -88,20 +95,34 @@ void FilterState::look_for_touch(size_t instrument, const FrameEvidence& frame, 
   free.step_covariance_mm2 = tip_floor_covariance_mm2(tip_mm, rectification, parameters);
   const bool closes = tip.closed.value_or(false) && hand.was_closed == false;
   const double reach_mm = options.threshold_mm + std::min(2 * free.gap_deviation_mm, 0.5 * options.threshold_mm);
-  if (free.gap_mm > reach_mm || tip.closed == false) return;
+  if (free.gap_mm > reach_mm || tip.closed == false) {
+    expect_touch(hand, gap, free.step_mm, tip_mm);
+    return;
+  }
   TouchEvidence evidence = touch_evidence(free, seconds, parameters);
   if (hand.released_at_mm && !evidence.unnoticed) return;
   const double rate = 1 - std::exp(-parameters.touch_per_s * seconds);
   double log_odds = std::log(rate / (1 - rate)) + evidence.log_ratio;
   if (closes) log_odds = parameters.told_log_odds;
   const double probability = 1 / (1 + std::exp(-log_odds));
-  if (probability < 0.5) return;
+  if (probability < 0.5) {
+    expect_touch(hand, gap, free.step_mm, tip_mm);
+    return;
+  }
   answer.is_off_limits = frame.may_be_held && !frame.may_be_held(place_at_rest(gap));
   if (answer.is_off_limits) return;
   begin(instrument, tip, gap, evidence.unnoticed && !closes);
   hand.is_confirmed = !evidence.unnoticed || closes;
   hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, parameters.unconfirmed) : probability);
   answer.begins = true;
+}
+
+void FilterState::expect_touch(Hand& hand, const Gap& gap, const Vec3& step_mm, const Vec3& tip_mm) {
+  hand.frames_expected = std::max(0, hand.frames_expected - 1);
+  const double closing_mm = -step_mm.dot(gap.normal), away_mm = std::max(0.0, gap.distance_mm - options.threshold_mm);
+  if (hand.frames_expected > 0 || closing_mm <= 0 || away_mm > kExpectedFrames * closing_mm) return;
+  hand.frames_expected = kExpectedFrames;
+  model.expect(place_at_rest(gap_of(tip_mm + away_mm / closing_mm * step_mm)), options.footprint_radius_mm);
 }
 
 void FilterState::release(size_t instrument, const Belief& without) {

@@ -70,6 +70,42 @@ TEST(ContactModel, APatchOfAnotherSizeAnswersAsOneThatWasAlwaysSo) {
   EXPECT_LT((changed->force_N - expected.force_N).norm(), 2e-3 * expected.force_N.norm());
 }
 
+TEST(ContactModel, ABodyThatWasExpectedAnswersAsOneThatWasNot) {
+  const Vec3 q(0.1, 0, -0.5);
+  ContactModel sudden(slab, kTissue, Element::averaged), expected(slab, kTissue, Element::averaged);
+  sudden.begin(kPlace_mm, kRadius_mm);
+  expected.expect(kPlace_mm, kRadius_mm);
+  expected.begin(kPlace_mm, kRadius_mm);
+  EXPECT_LT((expected.solve({q}).force_N - sudden.solve({q}).force_N).norm(), 1e-3 * sudden.solve({q}).force_N.norm());
+  // Expected nearby, the patch is laid where it has begun.
+  ContactModel nearby(slab, kTissue, Element::averaged);
+  nearby.expect(kPlace_mm + Vec3(0.6, -0.4, 0), kRadius_mm);
+  nearby.begin(kPlace_mm, kRadius_mm);
+  EXPECT_LT((nearby.footprint(0).center_mm - kPlace_mm).norm(), 1e-6);
+  EXPECT_LT((nearby.solve({q}).force_N - sudden.solve({q}).force_N).norm(), 0.05 * sudden.solve({q}).force_N.norm());
+  // Expected elsewhere, it is not used.
+  ContactModel elsewhere(slab, kTissue, Element::averaged);
+  elsewhere.expect({10, 10, 0}, kRadius_mm);
+  elsewhere.begin(kPlace_mm, kRadius_mm);
+  EXPECT_LT((elsewhere.solve({q}).force_N - sudden.solve({q}).force_N).norm(), 1e-3 * sudden.solve({q}).force_N.norm());
+}
+
+TEST(ContactModel, ARefreshedFactorDescribesTheStateAtHand) {
+  ContactModel model = held_slab();
+  const Vec3 q(0, 0, -2);
+  const Equilibrium now = model.solve({q});
+  for (int again = 0; again < 60; ++again) model.solve({q + 0.05 * Vec3::UnitX() * (again % 2)});
+  const Equilibrium last = model.solve({q});
+  model.refresh();
+  const ContactResponse response = model.respond(last, {q});
+  constexpr double kStep_mm = 0.02;
+  const Vec3 per_mm =
+      (model.solve({q + kStep_mm * Vec3::UnitZ()}).force_N - model.solve({q - kStep_mm * Vec3::UnitZ()}).force_N) /
+      (2 * kStep_mm);
+  EXPECT_LT((per_mm - response.force.col(2)).norm(), 0.1 * per_mm.norm());
+  EXPECT_LT((now.force_N - last.force_N).norm(), 1e-3 * now.force_N.norm());
+}
+
 TEST(ContactModel, TwoPatchesShareOneEquilibrium) {
   ContactModel model = held_slab();
   model.begin({30, 20, 0}, 3);
