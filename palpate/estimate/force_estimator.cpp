@@ -226,6 +226,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
     if (answer.instruments[i].begins) s.instruments.mark(i);
     if (instruments.eyes_out_of_step) of(i).warnings.push_back("eyes_out_of_step");
     if (obscured) continue;
+    if (!answer.instruments[i].is_kept) s.instruments.unmark(i);
     if (!after_map) answer.instruments[i].tip_mm = instruments.tips[i].tip_mm;
     const bool is_told = i == 0 && s.held_at_mm;
     if (is_told && answer.instruments[i].hold == Hold::free)

@@ -1,6 +1,7 @@
 #include "palpate/infer/belief.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -12,16 +13,23 @@ Mat3 SceneMotion::rotation() const {
   return Eigen::AngleAxisd(angle, rotation_rad / angle).toRotationMatrix();
 }
 
+Mat3 SceneMotion::linear() const {
+  Mat3 stretch = Mat3::Identity();
+  stretch.topLeftCorner<2, 2>() << 1 + strain.x(), strain.z(), strain.z(), 1 + strain.y();
+  return rotation() * stretch;
+}
+
 Vec3 SceneMotion::apply(const Vec3& in_map_mm) const {
-  return about_mm + translation_mm + rotation() * (in_map_mm - about_mm);
+  return about_mm + translation_mm + linear() * (in_map_mm - about_mm);
 }
 
 Vec3 SceneMotion::undo(const Vec3& now_mm) const {
-  return about_mm + rotation().transpose() * (now_mm - about_mm - translation_mm);
+  return about_mm + linear().inverse() * (now_mm - about_mm - translation_mm);
 }
 
 SceneMotion Belief::scene(const Vec3& about_mm) const {
-  return {mean.segment<3>(Unknowns::kTranslation), mean.segment<3>(Unknowns::kRotation), about_mm};
+  return {mean.segment<3>(Unknowns::kTranslation), mean.segment<3>(Unknowns::kRotation), about_mm,
+          mean.segment<3>(Unknowns::kStrain)};
 }
 
 Belief initial_belief(const InferenceParameters& parameters) {
@@ -31,7 +39,7 @@ Belief initial_belief(const InferenceParameters& parameters) {
   // The map frame itself: nothing has moved yet.
   constexpr double kStill = 0.01;
   deviation << Vec3::Constant(kStill * parameters.scene_mm), Vec3::Constant(kStill * parameters.scene_rad),
-      parameters.disparity_bias_px;
+      Vec3::Constant(kStill * parameters.scene_strain), parameters.disparity_bias_px;
   belief.covariance = deviation.cwiseAbs2().asDiagonal();
   return belief;
 }
@@ -54,6 +62,7 @@ Belief predict(const Belief& belief, double seconds, const InferenceParameters& 
   Belief next = belief;
   walk(next, Unknowns::kTranslation, 3, parameters.scene_mm, parameters.scene_walk_mm, seconds);
   walk(next, Unknowns::kRotation, 3, parameters.scene_rad, parameters.scene_walk_rad, seconds);
+  walk(next, Unknowns::kStrain, 3, parameters.scene_strain, parameters.scene_walk_strain, seconds);
   walk(next, Unknowns::kBias, 1, parameters.disparity_bias_px, 1e3, seconds);
   const double step_mm = parameters.hand_mm_per_s * seconds;
   auto variance = next.covariance.diagonal();

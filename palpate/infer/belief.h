@@ -8,22 +8,26 @@
 
 namespace palpate {
 
-/// Rigid motion of the scene since the map frame: x = about + translation + exp(rotation) (y - about).
+/// Motion of the scene since the map frame: x = about + translation + exp(rotation) (1 + strain) (y - about). What
+/// holds the tissue stretches as it breathes.
 struct SceneMotion {
   Vec3 translation_mm = Vec3::Zero();
   Vec3 rotation_rad = Vec3::Zero();
   Vec3 about_mm = Vec3::Zero();
+  Vec3 strain = Vec3::Zero();  ///< xx, yy, xy of the left camera frame
 
   Mat3 rotation() const;
+  /// exp(rotation) (1 + strain).
+  Mat3 linear() const;
   Vec3 apply(const Vec3& in_map_mm) const;
   Vec3 undo(const Vec3& now_mm) const;
 };
 
-/// Where each unknown of the estimate stands in its vector: the scene's translation and rotation and the stereo's
-/// common disparity bias, then for each contact q, offset, log radius and
-/// skew (common error of the model's motion of the tissue: it moves as if the patch were displaced by q + |q| skew).
+/// Where each unknown of the estimate stands in its vector: the scene's translation, rotation and strain and the
+/// stereo's common disparity bias, then for each contact q, offset, log radius and skew (common error of the model's
+/// motion of the tissue: it moves as if the patch were displaced by q + |q| skew).
 struct Unknowns {
-  static constexpr Eigen::Index kTranslation = 0, kRotation = 3, kBias = 6, kScene = 7, kContact = 10;
+  static constexpr Eigen::Index kTranslation = 0, kRotation = 3, kStrain = 6, kBias = 9, kScene = 10, kContact = 10;
   static Eigen::Index q(size_t contact) { return kScene + kContact * static_cast<Eigen::Index>(contact); }
   static Eigen::Index offset(size_t contact) { return q(contact) + 3; }
   static Eigen::Index log_radius(size_t contact) { return q(contact) + 6; }

@@ -20,7 +20,7 @@ ForceCorrelation force_correlation(const ForceAt& force, const Belief& posterior
     const double explained_N2 = c.dot(posterior.covariance.block(at, at, count, count).ldlt().solve(c));
     return std::sqrt(std::clamp(explained_N2 / variance_N2, 0.0, 1.0));
   };
-  return {with(Unknowns::kTranslation, 6), with(Unknowns::kBias, 1), with(Unknowns::offset(contact), 3),
+  return {with(Unknowns::kTranslation, 9), with(Unknowns::kBias, 1), with(Unknowns::offset(contact), 3),
           with(Unknowns::log_radius(contact), 1), with(Unknowns::skew(contact), 3)};
 }
 

@@ -133,6 +133,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     hand.last_tip_mm = answer.scene.undo(tip.tip_mm);
     if (tip.closed) hand.was_closed = tip.closed;
   }
+  for (size_t i = 0; i < s.hands.size(); ++i) answer.instruments[i].is_kept = s.hands[i].contact.has_value();
   return answer;
 }
 

@@ -34,7 +34,8 @@ struct FrameEvidence {
 struct InstrumentAnswer {
   Hold hold = Hold::free;
   double p_contact = 0;
-  bool begins = false;  ///< the contact begins in this frame
+  bool begins = false;   ///< the contact begins in this frame
+  bool is_kept = false;  ///< there is a contact, or one that has become improbable is kept in mind
   bool tip_inferred = false;
   bool converged = true;
   Vec3 tip_mm = Vec3::Zero();   ///< left camera frame: in contact the middle of the patch

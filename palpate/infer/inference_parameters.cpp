@@ -17,6 +17,8 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("scene_rad", p.scene_rad, positive, "prior of the scene's rotation");
   settings.number("scene_walk_mm", p.scene_walk_mm, positive, "random walk of the translation, mm per sqrt(s)");
   settings.number("scene_walk_rad", p.scene_walk_rad, positive, "random walk of the rotation, rad per sqrt(s)");
+  settings.number("scene_strain", p.scene_strain, positive, "prior of the scene's homogeneous strain");
+  settings.number("scene_walk_strain", p.scene_walk_strain, positive, "random walk of the strain, per sqrt(s)");
   settings.number("disparity_bias_px", p.disparity_bias_px, positive, "prior of the disparity's common bias");
   settings.number("hand_mm_per_s", p.hand_mm_per_s, positive, "speed of a hand");
   settings.number("log_radius", p.log_radius, positive, "prior of the log of the footprint radius");

@@ -23,10 +23,13 @@ Vec3 interpolated(const SurfacePlace& place, const Eigen::Ref<const Eigen::Vecto
   return sum;
 }
 
-/// dx/d(unknowns) of the point of the body now at R (X + u - about), for a displacement with these derivatives.
-void fill_scene_columns(const Vec3& turned_mm, const Mat3& A, decltype(Measurement::H)& H) {
+/// A dx/d(scene) of the point of the body at y = X + u - about in the map, x = R (1 + strain) y now.
+void fill_scene_columns(const SceneMotion& scene, const Vec3& y_mm, const Mat3& A, decltype(Measurement::H)& H) {
+  Mat3 by_strain;
+  by_strain << y_mm.x(), 0, y_mm.y(), 0, y_mm.y(), y_mm.x(), 0, 0, 0;
   H.middleCols<3>(Unknowns::kTranslation) = A;
-  H.middleCols<3>(Unknowns::kRotation) = -A * cross_matrix(turned_mm);
+  H.middleCols<3>(Unknowns::kRotation) = -A * cross_matrix(scene.linear() * y_mm);
+  H.middleCols<3>(Unknowns::kStrain) = A * scene.rotation() * by_strain;
 }
 
 }  // namespace
@@ -101,7 +104,7 @@ std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& see
   const Eigen::Index unknowns = body.x0.size();
   const Belief at{body.x0, {}};
   const SceneMotion scene = at.scene(body.about_mm);
-  const Mat3 R = scene.rotation();
+  const Mat3 L = scene.linear();
   const size_t contacts = at.contacts();
   Mat3 noise_px2;  // of left x, left y and left x minus right x
   noise_px2 << 1, 0, 1, 0, 1, 0, 1, 0, 2;
@@ -112,17 +115,17 @@ std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& see
   measurements.reserve(seen.size());
   for (const TissuePoint& point : seen) {
     const Vec3 u_mm = body.displacement_mm(point);
-    const Vec3 turned_mm = R * (point.rest_mm + u_mm - body.about_mm);
+    const Vec3 y_mm = point.rest_mm + u_mm - body.about_mm;
     const StereoProjection rest = project_stereo(rectification, point.rest_mm),
-                           now = project_stereo(rectification, body.about_mm + scene.translation_mm + turned_mm);
+                           now = project_stereo(rectification, body.about_mm + scene.translation_mm + L * y_mm);
     Measurement m;
     m.residual = point.motion_px - (now.px - rest.px) - Vec3(0, 0, body.x0[Unknowns::kBias]);
     m.H.setZero(3, unknowns);
-    fill_scene_columns(turned_mm, now.per_mm, m.H);
+    fill_scene_columns(scene, y_mm, now.per_mm, m.H);
     m.H(2, Unknowns::kBias) = 1;
     if (body.response) {
       const SurfacePlace& place = body.places->at(static_cast<size_t>(point.number));
-      const Mat3 A = now.per_mm * R;
+      const Mat3 A = now.per_mm * L;
       for (size_t k = 0; k < contacts && place.on_body; ++k) {
         const auto column = static_cast<Eigen::Index>(k);
         const Mat3 motion = A * body.motion_by(point, k);
@@ -154,14 +157,14 @@ Measurement tip_measurement(const Vec3& tip_mm, const Mat3& covariance_mm2, size
                             const InferenceParameters& parameters) {
   const Belief at{body.x0, {}};
   const SceneMotion scene = at.scene(body.about_mm);
-  const Mat3 R = scene.rotation();
-  const Vec3 turned_mm = R * (center_mm + at.q_mm(contact) + at.offset_mm(contact) - body.about_mm);
+  const Mat3 L = scene.linear();
+  const Vec3 y_mm = center_mm + at.q_mm(contact) + at.offset_mm(contact) - body.about_mm;
   Measurement m;
-  m.residual = tip_mm - (body.about_mm + scene.translation_mm + turned_mm);
+  m.residual = tip_mm - (body.about_mm + scene.translation_mm + L * y_mm);
   m.H.setZero(3, body.x0.size());
-  fill_scene_columns(turned_mm, Mat3::Identity(), m.H);
-  m.H.middleCols<3>(Unknowns::q(contact)) = R;
-  m.H.middleCols<3>(Unknowns::offset(contact)) = R;
+  fill_scene_columns(scene, y_mm, Mat3::Identity(), m.H);
+  m.H.middleCols<3>(Unknowns::q(contact)) = L;
+  m.H.middleCols<3>(Unknowns::offset(contact)) = L;
   m.covariance = covariance_mm2 + tip_floor_covariance_mm2(tip_mm, rectification, parameters);
   m.dof = parameters.tip_dof;
   return m;

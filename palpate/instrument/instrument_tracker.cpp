@@ -333,6 +333,7 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
     const ExampleColours colours = s.finders[0].learn(pair.left, s.example);
     for (InstrumentFinder& finder : s.finders) finder.use(colours);
   }
+  s.way.keep(std::any_of(s.trackers.begin(), s.trackers.end(), [](const TipTracker& t) { return t.marked(); }));
   std::array<FoundInstruments, 2> found = s.find(pair);
   std::array<SeenByEye, 2> seen;
   const auto see = [&](size_t eye) {

@@ -60,6 +60,7 @@ void WayChoice::compare(const std::vector<BothWays>& cameras, const std::vector<
   }
   const bool with_colours = all_see_one(in_colours), with_network = all_see_one(in_network);
   sees_any_ = with_colours || with_network;
+  if (is_kept_ && (by_colours_ ? with_colours : with_network)) return;
   if (with_colours != with_network)
     by_colours_ = with_colours;
   else if (with_colours)

@@ -22,13 +22,16 @@ class WayChoice {
   bool compares() const { return !known_ || frames_alone_ >= kFramesAlone; }
   /// A frame was looked at in the chosen way; false: something that was there is missing, so both ways are to look.
   bool suffices(const std::vector<FoundInstruments>& found);
+  /// While an instrument touches, its displacement is measured against how it looked at the touch: the way stays, as
+  /// long as it shows an instrument.
+  void keep(bool is_kept) { is_kept_ = is_kept; }
   /// Chooses, by what the cameras show in one frame; `picture_areas` are 255 inside the pictures.
   void compare(const std::vector<BothWays>& cameras, const std::vector<cv::Mat>& picture_areas);
 
  private:
   static constexpr int kFramesAlone = 4;
 
-  bool known_ = false, by_colours_ = true, sees_any_ = false;
+  bool known_ = false, by_colours_ = true, sees_any_ = false, is_kept_ = false;
   double agreement_ = 0;  ///< overlap of what both ways found so far
   int frames_alone_ = 0;
 };

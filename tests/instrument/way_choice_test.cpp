@@ -53,6 +53,16 @@ TEST(WayChoice, TheColoursDrawWhereTheNetworkFindsNothing) {
   EXPECT_TRUE(way.by_colours());
 }
 
+TEST(WayChoice, TheWayStaysDuringAContactWhileItShowsAnInstrument) {
+  WayChoice way;
+  way.compare(both(pair_of(100), pair_of(100)), kAreas);
+  way.keep(true);
+  for (int frame = 0; frame < 5; ++frame) way.compare(both(pair_of(250), pair_of(100)), kAreas);
+  EXPECT_TRUE(way.by_colours());
+  way.compare(both(kNothing, pair_of(100)), kAreas);
+  EXPECT_FALSE(way.by_colours());
+}
+
 TEST(WayChoice, WhatCannotBeOneTipInBothCamerasIsNotSeen) {
   WayChoice way;
   way.compare(both({shaft(100), shaft(250)}, pair_of(100)), kAreas);
