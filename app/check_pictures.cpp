@@ -95,6 +95,7 @@ void write_check_pictures(const SceneFile& scene_file, const BuiltMap& built, co
   const int frames = recording.frame_count();
   std::vector<cv::Mat> pictures;
   while (auto frame = recording.next()) {
+    if (frame->left.empty() || frame->right.empty()) continue;
     const RectifiedPair pair = rectify(rectification, *frame);
     const InstrumentObservations seen = tracker.update(pair);
     // Evenly spread; the first ten where nobody knows how many there are.

@@ -79,13 +79,17 @@ std::string text_of_comparison(const Comparison& c) {
 
 }  // namespace
 
-BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
+BuildWatch watch_of_terminal(bool quiet) {
   BuildWatch watch;
   if (!quiet)
     watch.told = [](const std::string& what, const std::string& sentence) {
       fmt::print(stderr, "{:<12}{}\n", what, sentence);
     };
-  return palpate::build_map(scene_file, watch);
+  return watch;
+}
+
+BuiltMap build_map(const SceneFile& scene_file, bool quiet) {
+  return palpate::build_map(scene_file, *open_recording(scene_file), watch_of_terminal(quiet));
 }
 
 std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
@@ -97,7 +101,9 @@ std::vector<ForceRow> estimate_rows(const SceneFile& scene_file, bool quiet) {
   while (auto frame = recording.next()) {
     rows.push_back(to_row(estimator.update(*frame)));
     progress.show(frame->index + 1, recording.frame_count());
-    if (interrupted()) throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
+    if (!interrupted()) continue;
+    if (recording.is_live()) break;
+    throw Unfinished(fmt::format("interrupted after frame {}", frame->index));
   }
   return rows;
 }
@@ -106,14 +112,17 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
   require_output_folder(options.folder);
   Truths truths = read_truths(options.truth);
   Stopwatch watch;
-  const BuiltMap built = build_map(scene_file, options.quiet);
+  const std::shared_ptr<Recording> recording = open_recording(scene_file);
+  const BuiltMap built = palpate::build_map(scene_file, *recording, watch_of_terminal(options.quiet));
+  const bool is_live = recording->is_live();
   const double map_s = watch.lap_ms() / 1000;
   if (!options.quiet)
     fmt::print(stderr, "map         {} tetrahedra, {} attached nodes, {} points, {:.2f} s\n",
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size(), built.map.cloud.size(), map_s);
 
-  Run run(scene_file, built, options.folder, std::move(truths),
-          {options.realtime, [] { return interrupted().load(); }});
+  Run run(scene_file, built, options.folder, std::move(truths), {options.realtime, [] { return interrupted().load(); }},
+          is_live ? recording : nullptr);
+  if (is_live && !options.quiet) fmt::print(stderr, "live        Ctrl-C ends it and keeps what is done\n");
   if (!options.quiet)
     for (const std::string& note : run.streams().notes()) fmt::print(stderr, "streams     {}\n", note);
   {
@@ -131,6 +140,7 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
     throw Unfinished(
         fmt::format("{}; {} frames are kept in {}", files.losses.text(), files.rows.size(), options.folder.string()));
   RunSummary summary = summary_of(files, map_s);
+  if (is_live) summary.dropped = files.dropped;
   summary.streams = run.streams().summary();
   return summary;
 }
@@ -142,6 +152,8 @@ std::string to_text(const RunSummary& summary) {
   for (const auto& [status, count] : summary.frames_by_status)
     statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
   line("frames", fmt::format("{} ({})", summary.frames, statuses));
+  if (summary.dropped)
+    line("dropped", fmt::format("{} frames, a newer one was looked at in their place", *summary.dropped));
   line("map", fmt::format("{} tetrahedra in {:.2f} s", summary.elements, summary.map_s));
   line("time per frame",
        fmt::format("{:.1f} ms median, {:.1f} ms for 99 %", summary.median_frame_ms, summary.p99_frame_ms));
@@ -171,6 +183,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["frames"] = summary.frames;
   json["frames_by_status"] = summary.frames_by_status;
   json["frames_by_warning"] = summary.frames_by_warning;
+  if (summary.dropped) json["dropped_frames"] = *summary.dropped;
   json["elements"] = summary.elements;
   json["map_s"] = summary.map_s;
   json["median_frame_ms"] = summary.median_frame_ms;

@@ -23,6 +23,7 @@ struct RunSummary {
   std::filesystem::path folder;  ///< where the results are
   TissueOptions tissue;
   int frames = 0;
+  std::optional<int> dropped;  ///< of a live source: frames in whose place a newer one was looked at
   int elements = 0;
   double map_s = 0;
   double median_frame_ms = 0;
@@ -37,6 +38,9 @@ struct RunSummary {
   std::optional<Comparison> comparison_2;
   std::vector<std::string> streams;  ///< what was sent, a line for each stream
 };
+
+/// Tells people on standard error what a build finds on the way.
+BuildWatch watch_of_terminal(bool quiet);
 
 /// The build stage of a scene; what is found on the way goes to standard error. Throws BadInput, Unfinished.
 BuiltMap build_map(const SceneFile& scene_file, bool quiet);

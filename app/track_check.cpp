@@ -34,6 +34,7 @@ TipsOfAll tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
   Recording recording(scene.recording);
   Progress progress("track", quiet);
   while (auto frame = recording.next()) {
+    if (frame->left.empty() || frame->right.empty()) continue;
     const InstrumentObservations observed = tracker.update(rectify(rectification, *frame));
     for (size_t i = 0; i < kMostInstruments; ++i) {
       if (!observed.tips[i].visible) continue;

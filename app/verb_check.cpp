@@ -73,7 +73,7 @@ void add_check(CLI::App& app) {
     const BuiltMap built = build_map(scene_file, arguments->json);
     std::optional<TrackCheck> track;
     if (const InstrumentOptions& instrument = scene_file.scene.instrument;
-        !instrument.track.empty() && !instrument.has_live_track())
+        !instrument.track.empty() && !instrument.has_live_track() && !built.timing.is_live)
       track = check_track(scene_file, built, arguments->json);
     if (!arguments->folder.empty()) write_check_pictures(scene_file, built, arguments->folder, arguments->json);
     if (arguments->json) {

@@ -24,6 +24,7 @@ void add_console(CLI::App& app) {
     std::filesystem::path scene, root;
     std::string bind;
     int port = 8090;
+    bool live = false;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("console", "The operator's page in the browser: from a recording to a force");
@@ -38,6 +39,8 @@ void add_console(CLI::App& app) {
   verb->add_option("--root", arguments->root,
                    "the only folder that the page may open and write below; as a rule that of the scene")
       ->type_name("FOLDER");
+  verb->add_flag("--live", arguments->live,
+                 "let the page open cameras, addresses and GStreamer pipelines, which can read and write anything");
   verb->footer("Example: palpate console demo/recording/scene.yaml");
   verb->callback([arguments] {
     std::filesystem::path root = arguments->root;
@@ -45,6 +48,7 @@ void add_console(CLI::App& app) {
     ConsoleOptions options;
     options.port = arguments->port;
     options.page = page_folder();
+    options.may_open_live = arguments->live;
     options.asks_for_token = !arguments->bind.empty();
     if (options.asks_for_token) options.address = arguments->bind;
     ConsoleServer server(options, RootFolder(root));

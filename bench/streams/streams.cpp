@@ -12,6 +12,7 @@
 
 #include "app/run.h"
 #include "app/runtime.h"
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/estimate/force_estimator.h"
 #include "palpate/feedback/forces_file.h"
@@ -19,7 +20,6 @@
 #include "palpate/feedback/quantile.h"
 #include "palpate/stereo/recording.h"
 #include "palpate/stream/address.h"
-#include "palpate/stream/clock.h"
 #include "palpate/stream/passive_force.h"
 #include "palpate/stream/stream_hub.h"
 

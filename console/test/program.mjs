@@ -14,8 +14,8 @@ export function run(...words) {
 }
 
 /** A console below `root`; `port` 0 = any. */
-export async function startConsole(root, port = 0) {
-  const child = spawn(program, ['console', '--root', root, '--port', String(port)], {stdio: ['ignore', 'pipe', 'inherit']});
+export async function startConsole(root, port = 0, words = []) {
+  const child = spawn(program, ['console', '--root', root, '--port', String(port), ...words], {stdio: ['ignore', 'pipe', 'inherit']});
   const address = await new Promise((resolve, reject) => {
     let text = '';
     child.on('exit', (code) => reject(new Error(`the console ended with ${code}`)));

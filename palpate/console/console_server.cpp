@@ -25,9 +25,9 @@
 #include "palpate/console/messages.h"
 #include "palpate/console/page_files.h"
 #include "palpate/console/pictures.h"
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/session/shape.h"
-#include "palpate/stream/clock.h"
 
 namespace palpate {
 
@@ -93,7 +93,8 @@ struct Hub {
   Hub(const ConsoleOptions& options, RootFolder root)
       : access(access_for(options.address, options.asks_for_token)),
         page(read_page_files(options.page)),
-        session(std::move(root), [this] { wake(); }) {}
+        session(
+            std::move(root), [this] { wake(); }, options.may_open_live) {}
 
   /// From any thread: once for any number of changes.
   void wake() {
@@ -172,7 +173,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
     }
     const std::shared_ptr<const RunFrame> frame = now->run ? now->run->shown : nullptr;
     if (!frame) return;
-    const double age_ms = now->run->over ? 1e9 : static_cast<double>(steady_ns() - frame->decoded_ns) * 1e-6;
+    const double age_ms = now->run->over ? 1e9 : static_cast<double>(steady_ns() - frame->taken_ns) * 1e-6;
     if (wants_picture_ && frame != picture_) {
       if (picture_ && frame->estimate.frame > picture_->estimate.frame + 1)
         hub_.pictures_replaced += static_cast<uint64_t>(frame->estimate.frame - picture_->estimate.frame - 1);

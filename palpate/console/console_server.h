@@ -12,6 +12,7 @@ struct ConsoleOptions {
   std::string address = "127.0.0.1";
   int port = 8090;              ///< 0 = any that is free
   bool asks_for_token = false;  ///< of every viewer
+  bool may_open_live = false;   ///< viewers may open devices, pipelines and addresses
   std::filesystem::path page;   ///< folder of the built page
 };
 
@@ -25,7 +26,7 @@ struct ConsoleCounts {
 /// bytes. At most one write waits on each socket; the newest wins, so a viewer that stalls costs nobody anything.
 ///
 /// Bytes sent: kind (uint32: 1 = picture, 2 = shape), frame (int32), age (double, ms: since both pictures of the frame
-/// were there), then a JPEG or a shape (palpate/session/shape.h).
+/// were there, of a live source since its stamp), then a JPEG or a shape (palpate/session/shape.h).
 class ConsoleServer {
  public:
   /// Throws BadInput: an address or port that cannot be listened on.

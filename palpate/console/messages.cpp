@@ -72,7 +72,8 @@ Command command_of(const std::string& name, const json& m) {
       {"start", [](const json& j) -> Command { return ask::Start{field(j, "realtime", true)}; }},
       {"stop", [](const json&) -> Command { return ask::Stop{}; }},
       {"mark", [](const json& j) -> Command { return ask::Mark{text(j, "text")}; }},
-      {"rest", [](const json&) -> Command { return ask::Rest{}; }}};
+      {"rest", [](const json&) -> Command { return ask::Rest{}; }},
+      {"record", [](const json& j) -> Command { return ask::Record{field(j, "on", true)}; }}};
   const auto found = kCommands.find(name);
   if (found == kCommands.end()) throw BadInput(fmt::format("'{}' is nothing that can be asked for", name));
   return found->second(m);

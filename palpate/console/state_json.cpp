@@ -6,9 +6,9 @@
 
 #include "palpate/console/messages.h"
 #include "palpate/console/row_json.h"
+#include "palpate/core/clock.h"
 #include "palpate/feedback/map_json.h"
 #include "palpate/feedback/warnings.h"
-#include "palpate/stream/clock.h"
 
 namespace palpate {
 
@@ -64,7 +64,10 @@ ordered_json source_json(const SourceView& source) {
           {"rectified_focal_px", rounded(source.rectification.focal_px)},
           {"rectified_baseline_mm", rounded(source.rectification.baseline_mm)},
           {"timing", describe_timing(source.timing)},
-          {"notes", source.notes}};
+          {"notes", source.notes},
+          {"live", source.timing.is_live},
+          {"silent", source.is_silent},
+          {"picture", source.number}};
 }
 
 ordered_json map_state(const Snapshot& s) {
@@ -77,11 +80,9 @@ ordered_json map_state(const Snapshot& s) {
 }
 
 ordered_json run_state(const RunView& run, const RootFolder& root) {
-  ordered_json json = {{"folder", root.name_of(run.folder)},
-                       {"frames", run.frame_count},
-                       {"over", run.over},
-                       {"end", run.end},
-                       {"passed_over", run.passed_over}};
+  ordered_json json = {
+      {"folder", root.name_of(run.folder)}, {"frames", run.frame_count}, {"over", run.over}, {"end", run.end},
+      {"passed_over", run.passed_over},     {"dropped", run.dropped}};
   json["marks"] = ordered_json::array();
   for (const RunMark& mark : run.marks) json["marks"].push_back({mark.frame, rounded(mark.time_s), mark.text});
   if (!run.shown) return json;
@@ -93,15 +94,22 @@ ordered_json run_state(const RunView& run, const RootFolder& root) {
                       {"contact", rounded(t.contact_ms)}, {"solve", rounded(t.solve_ms)},
                       {"stress", rounded(t.stress_ms)},   {"draw", rounded(t.draw_ms)}};
   json["answer_ms"] = rounded(static_cast<double>(run.shown_ns - run.shown->decoded_ns) * 1e-6);
+  json["waited_ms"] = rounded(static_cast<double>(run.shown->decoded_ns - run.shown->taken_ns) * 1e-6);
   json["warnings"] = ordered_json::array();
   for (const std::string& warning : estimate.warnings) json["warnings"].push_back(warning_words(warning));
   return json;
+}
+
+ordered_json kept_json(const KeptView& kept, const RootFolder& root) {
+  return {{"folder", root.name_of(kept.folder)}, {"frames", kept.frames}, {"seconds", rounded(kept.seconds)},
+          {"left_out", kept.left_out},           {"over", kept.over},     {"end", kept.end}};
 }
 
 }  // namespace
 
 std::string state_json(const Snapshot& s, const RootFolder& root, ToldSoFar& told, bool& has_more) {
   ordered_json json = {{"version", s.version}, {"phase", phase_name(s.phase)}, {"sentence", s.sentence}};
+  json["may_open_live"] = s.may_open_live;
   json["stages"] = ordered_json::array();
   for (const StageTime& stage : s.stages) json["stages"].push_back({stage.stage, std::round(stage.ms)});
   const bool scene_is_new = told.nothing || told.scene_file != s.scene_file || told.scene_text != s.scene_text ||
@@ -119,6 +127,7 @@ std::string state_json(const Snapshot& s, const RootFolder& root, ToldSoFar& tol
   told.map = s.map;
   told.map_is_stale = s.map_is_stale;
   has_more = false;
+  json["kept"] = s.kept ? kept_json(*s.kept, root) : ordered_json();
   json["run"] = s.run ? run_state(*s.run, root) : ordered_json();
   const std::shared_ptr<const RowLog> log = s.run ? s.run->rows : nullptr;
   if (log != told.log) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/source_kind.h"
 #include "palpate/core/yaml_tree.h"
 
 namespace palpate {
@@ -239,12 +240,8 @@ void Settings::path(const std::string& key, std::filesystem::path& field, const 
     if (!node.IsScalar() || node.Scalar().empty())
       throw BadInput(fmt::format("{} is {}, expected a path", place, written(node)));
     const std::string expanded = expanded_at(place, node);
-    // A device number or a GStreamer pipeline is no file name.
-    const bool is_device = expanded.find_first_not_of("0123456789") == std::string::npos;
-    const bool is_pipeline = expanded.find(" ! ") != std::string::npos;
-    const bool is_url = expanded.find("://") != std::string::npos;
-    field = (is_device || is_pipeline || is_url) ? std::filesystem::path(expanded)
-                                                 : (context.folder / expanded).lexically_normal();
+    const bool is_file = kind_of_source(expanded) == SourceKind::file;
+    field = is_file ? (context.folder / expanded).lexically_normal() : std::filesystem::path(expanded);
   };
   entry->write = [&field] { return field.empty() ? std::string() : yaml_text(field.string()); };
   entry->default_text = field.string();

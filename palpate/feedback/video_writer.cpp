@@ -58,10 +58,11 @@ struct VideoWriter::State {
   std::unique_ptr<SwsContext, FreeScaler> scaler;
   std::unique_ptr<AVFrame, FreeFrame> picture{av_frame_alloc()};
   std::unique_ptr<AVPacket, FreePacket> packet{av_packet_alloc()};
-  int frames = 0;
+  int frames = 0, quality_crf = 23;
+  int64_t next_tick = 0;  ///< the earliest for the next frame
   bool has_header = false;
 
-  int64_t ticks(int frame) const { return std::llround(frame * kTicksPerSecond / fps); }
+  int64_t ticks(double time_s) const { return std::llround(time_s * kTicksPerSecond); }
 
   void check(int result) const {
     if (result < 0)
@@ -87,7 +88,7 @@ struct VideoWriter::State {
     codec->global_quality = 3 * FF_QP2LAMBDA;  // of MPEG-4; x264 has its own
     av_opt_set(codec->priv_data, "preset", "superfast", 0);
     av_opt_set(codec->priv_data, "tune", "zerolatency", 0);
-    av_opt_set(codec->priv_data, "crf", "23", 0);
+    av_opt_set(codec->priv_data, "crf", std::to_string(quality_crf).c_str(), 0);
     return avcodec_open2(codec.get(), encoder, nullptr) >= 0;
   }
 
@@ -113,7 +114,7 @@ struct VideoWriter::State {
   void drain() {
     const AVStream& stream = *output->streams[0];
     while (avcodec_receive_packet(codec.get(), packet.get()) >= 0) {
-      packet->duration = ticks(frames + 1) - ticks(frames);
+      packet->duration = ticks(1 / fps);
       av_packet_rescale_ts(packet.get(), codec->time_base, stream.time_base);
       packet->stream_index = 0;
       const int written = av_write_frame(output.get(), packet.get());
@@ -140,13 +141,14 @@ struct VideoWriter::State {
   }
 };
 
-VideoWriter::VideoWriter(const std::filesystem::path& file, double fps, const cv::Size& size)
+VideoWriter::VideoWriter(const std::filesystem::path& file, double fps, const cv::Size& size, int quality_crf)
     : state_(std::make_unique<State>()) {
   av_log_set_level(AV_LOG_QUIET);
   State& s = *state_;
   s.file = file;
   s.fps = fps;
   s.size = size;
+  s.quality_crf = quality_crf;
   require_room(file, 0);
   const bool opened = s.open_encoder(avcodec_find_encoder_by_name("libx264")) ||
                       s.open_encoder(avcodec_find_encoder(AV_CODEC_ID_MPEG4));
@@ -171,6 +173,10 @@ VideoWriter::~VideoWriter() {
 VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
 
 void VideoWriter::write(const cv::Mat& bgr) {
+  write(bgr, state_->frames / state_->fps);
+}
+
+void VideoWriter::write(const cv::Mat& bgr, double time_s) {
   State& s = *state_;
   if (bgr.size() != s.size || bgr.type() != CV_8UC3)
     throw std::invalid_argument("VideoWriter::write: the image is not an 8-bit BGR image of the video's size");
@@ -179,7 +185,8 @@ void VideoWriter::write(const cv::Mat& bgr) {
   const uint8_t* const rows[] = {bgr.data};
   const int strides[] = {static_cast<int>(bgr.step)};
   sws_scale(s.scaler.get(), rows, strides, 0, s.codec->height, s.picture->data, s.picture->linesize);
-  s.picture->pts = s.ticks(s.frames);
+  s.picture->pts = std::max(s.ticks(time_s), s.next_tick);
+  s.next_tick = s.picture->pts + 1;
   s.check(avcodec_send_frame(s.codec.get(), s.picture.get()));
   s.drain();
   ++s.frames;

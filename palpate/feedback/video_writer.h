@@ -12,13 +12,16 @@ namespace palpate {
 class VideoWriter {
  public:
   /// Throws Unfinished when no encoder opens the file, or the disk is full.
-  VideoWriter(const std::filesystem::path& file, double fps, const cv::Size& size);
+  /// `quality_crf`: of x264, less is finer.
+  VideoWriter(const std::filesystem::path& file, double fps, const cv::Size& size, int quality_crf = 23);
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;
 
   /// 8-bit BGR of the size given at the start. Throws Unfinished when the disk is full, std::invalid_argument when the
   /// image has another size.
   void write(const cv::Mat& bgr);
+  /// The same at a time of its own, counted from the first; times rise.
+  void write(const cv::Mat& bgr, double time_s);
 
   /// Closes the file and checks that every frame is in it; throws Unfinished when not. Nothing can be written after.
   void finish();

@@ -14,6 +14,7 @@ const std::vector<std::pair<std::string, std::string>>& known_warnings() {
       {"modulus_unknown", "Young's modulus unknown: force in N per kPa"},
       {"tip_inferred", "tip hidden, the tissue tells the force"},
       {"camera_missing", "one camera has no picture"},
+      {"source_lost", "the live source gives no pictures"},
       {"sliding", "the tip slides over the tissue"},
       {"frame_passed_over", "the next frame was there before this one could be looked at"},
       {"eyes_out_of_step", "the two videos do not show the same moment"},

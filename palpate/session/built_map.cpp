@@ -23,6 +23,7 @@ namespace {
 
 /// Outlines may run along the border of the image, not mostly outside.
 constexpr double kLeastShareInImage = 0.5;
+constexpr double kBlack_levels = 40, kLongestDarkness_s = 10;
 
 /// A region drawn in a picture of another size selects the wrong tissue, or none.
 void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size size) {
@@ -36,11 +37,26 @@ void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size
       around.tl().x, around.tl().y, around.br().x - 1, around.br().y - 1, size.width, size.height));
 }
 
+/// Cameras that are switched on begin with black pictures.
+bool shows_something(const StereoFrame& frame) {
+  return !frame.left.empty() && !frame.right.empty() && cv::norm(frame.left, cv::NORM_INF) > kBlack_levels &&
+         cv::norm(frame.right, cv::NORM_INF) > kBlack_levels;
+}
+
 /// The frames that the map is built from, the last of them its static frame. Throws BadInput.
 std::vector<StereoFrame> static_frames(Recording& recording, const MapOptions& options) {
   std::optional<StereoFrame> frame = recording.next();
   std::vector<StereoFrame> frames;
-  while (frame && frame->index < options.frame) {
+  const double begun_s = frame ? frame->time_s : 0;
+  const auto is_too_early = [&] {
+    return frame->index < options.frame || (recording.is_live() && !shows_something(*frame));
+  };
+  while (frame && is_too_early()) {
+    if (recording.is_live() && frame->time_s - begun_s > kLongestDarkness_s)
+      throw BadInput(
+          fmt::format("recording: live, but within {} s there was no frame in which both cameras show "
+                      "something",
+                      kLongestDarkness_s));
     if (frame->index >= options.first_frame() && !frame->right.empty()) frames.push_back(*frame);
     frame = recording.next();
   }
@@ -52,6 +68,8 @@ std::vector<StereoFrame> static_frames(Recording& recording, const MapOptions& o
         fmt::format("map.frame is {}, but the right camera shows nothing of that time, expected a frame that both have",
                     options.frame));
   frames.push_back(*frame);
+  if (recording.is_live())
+    for (StereoFrame& taken : frames) taken.index = -1;
   return frames;
 }
 
@@ -68,10 +86,13 @@ std::string sentence_in_scene(const SceneFile& scene_file, const std::string& ke
   return fmt::format("{}: {}{}", scene_file.file.string(), told, sentence);
 }
 
-BuiltMap build_map(const SceneFile& scene_file, const BuildWatch& watch) {
+std::shared_ptr<Recording> open_recording(const SceneFile& scene_file) {
+  return in_scene(scene_file, "recording", [&] { return std::make_shared<Recording>(scene_file.scene.recording); });
+}
+
+BuiltMap build_map(const SceneFile& scene_file, Recording& recording, const BuildWatch& watch) {
   const Scene& scene = scene_file.scene;
   const auto opened = [&](const std::string& key, const auto& stage) { return in_scene(scene_file, key, stage); };
-  Recording recording = opened("recording", [&] { return Recording(scene.recording); });
   const StereoRig rig = opened("recording.calibration", [&] {
     StereoRig read = read_rig(scene.recording);
     check_rig_fits(read, recording.size());

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,9 +31,13 @@ struct BuildWatch {
   OnStage on_stage = [](const std::string&) {};
 };
 
-/// The build stage of a scene: opens all that the scene names, reads up to the map frame, builds. Throws BadInput with
-/// a sentence that names the scene file, Unfinished.
-BuiltMap build_map(const SceneFile& scene_file, const BuildWatch& watch);
+/// The recording of a scene. Throws BadInput with a sentence that names the scene file.
+std::shared_ptr<Recording> open_recording(const SceneFile& scene_file);
+
+/// The build stage of a scene: opens all that the scene names, reads up to the map frame, builds. Of a live source it
+/// is the first frame from map.frame on that shows something in both cameras; its index is -1, before any run. Throws
+/// BadInput with a sentence that names the scene file, Unfinished.
+BuiltMap build_map(const SceneFile& scene_file, Recording& recording, const BuildWatch& watch);
 
 /// The map of another frame of the same recording, which becomes the state at rest. Throws BadInput.
 BuiltMap build_map_again(const SceneFile& scene_file, const BuiltMap& before, const StereoFrame& frame,

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "palpate/stream/clock.h"
+#include "palpate/core/clock.h"
 
 namespace palpate {
 
@@ -20,7 +20,7 @@ std::optional<PlayedFrame> Playback::next() {
   if (!frame) return std::nullopt;
   PlayedFrame played;
   played.frame = std::move(*frame);
-  if (realtime_) {
+  if (realtime_ && !recording_.is_live()) {
     const auto at_ns = static_cast<int64_t>(1e9 * played.frame.time_s);
     if (!start_ns_) start_ns_ = steady_ns() - at_ns;
     const int64_t due_ns = *start_ns_ + at_ns;
@@ -34,15 +34,16 @@ std::optional<PlayedFrame> Playback::next() {
     if (is_over && !played.passed_over) *start_ns_ += late_ns;
   }
   played.decoded_ns = steady_ns();
+  played.taken_ns = recording_.is_live() ? recording_.taken_ns() : played.decoded_ns;
   return played;
 }
 
-ForceEstimate passed_over(const StereoFrame& frame) {
+ForceEstimate not_looked_at(const StereoFrame& frame, const std::string& warning) {
   ForceEstimate estimate;
   estimate.frame = frame.index;
   estimate.time_s = frame.time_s;
   estimate.status = FrameStatus::tool_lost;
-  estimate.warnings = {"frame_passed_over"};
+  estimate.warnings = {warning};
   return estimate;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "palpate/estimate/force_estimate.h"
@@ -12,12 +13,14 @@ namespace palpate {
 
 struct PlayedFrame {
   StereoFrame frame;
-  int64_t decoded_ns = 0;    ///< steady clock (palpate/stream/clock.h), when both pictures were there
+  int64_t taken_ns = 0;      ///< steady clock (palpate/core/clock.h), of a live source by its stamp; else decoded_ns
+  int64_t decoded_ns = 0;    ///< when both pictures were there
   bool passed_over = false;  ///< its time is over: the next one is there already
 };
 
 /// The frames of a recording, as fast as they are asked for, or at the rate at which they were recorded: then a frame
-/// whose time is over is passed over, and where the computer cannot keep up all the same, the clock is slowed down.
+/// whose time is over is passed over, and where the computer cannot keep up all the same, the clock is slowed down. A
+/// live source gives its newest frame.
 class Playback {
  public:
   /// `stopped`: asked while it waits.
@@ -35,7 +38,7 @@ class Playback {
   int passed_over_ = 0;  ///< in a row, until now
 };
 
-/// The row of a frame that was passed over.
-ForceEstimate passed_over(const StereoFrame& frame);
+/// The row of a frame that was not looked at, and the warning that says why.
+ForceEstimate not_looked_at(const StereoFrame& frame, const std::string& warning);
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/source_kind.h"
 
 namespace palpate {
 
@@ -14,8 +15,8 @@ namespace {
 void collect_sources(const YAML::Node& node, std::vector<std::string>& sources) {
   if (node.IsScalar()) {
     const std::string& text = node.Scalar();
-    if (text.starts_with('/') || text.find(" ! ") != std::string::npos || text.find("://") != std::string::npos)
-      sources.push_back(text);
+    const SourceKind kind = kind_of_source(text);
+    if (text.starts_with('/') || kind == SourceKind::pipeline || kind == SourceKind::address) sources.push_back(text);
     return;
   }
   for (const auto& part : node) collect_sources(node.IsMap() ? part.second : part, sources);
@@ -51,10 +52,14 @@ std::string RootFolder::name_of(const std::filesystem::path& file) const {
   return holds(file) ? std::filesystem::weakly_canonical(file).lexically_relative(folder_).string() : file.string();
 }
 
-void RootFolder::require_holds_all(const SceneFile& scene, const std::vector<std::string>& trusted) const {
+void RootFolder::require_holds_all(const SceneFile& scene, const std::vector<std::string>& trusted,
+                                   bool may_open_live) const {
   for (const std::string& source : sources_of(scene)) {
     if (std::find(trusted.begin(), trusted.end(), source) != trusted.end()) continue;
-    if (source.starts_with('/') && source.find(" ! ") == std::string::npos && holds(source)) continue;
+    const bool is_file = kind_of_source(source) == SourceKind::file;
+    if (is_file ? holds(source) : may_open_live) continue;
+    if (!is_file)
+      throw BadInput(fmt::format("{} is a live source; palpate console --live lets this page open those", source));
     throw BadInput(fmt::format(
         "{} is outside of the folder that this page may open, {}; palpate console SCENE.yaml --root FOLDER opens it",
         source, folder_.string()));
@@ -68,9 +73,8 @@ std::vector<std::string> sources_of(const SceneFile& scene) {
   collect_sources(YAML::Load(write_scene_file(read)), sources);
   // A device is a mere number.
   const RecordingOptions& recording = scene.scene.recording;
-  for (const std::filesystem::path& eye : {recording.left, recording.right, recording.stereo})
-    if (!eye.empty() && eye.string().find_first_not_of("0123456789") == std::string::npos)
-      sources.push_back(eye.string());
+  for (const std::filesystem::path& camera : {recording.left, recording.right, recording.stereo})
+    if (kind_of_source(camera.string()) == SourceKind::device) sources.push_back(camera.string());
   return sources;
 }
 

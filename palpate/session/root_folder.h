@@ -22,9 +22,9 @@ class RootFolder {
   /// Relative to the root, for people.
   std::string name_of(const std::filesystem::path& file) const;
 
-  /// Throws BadInput where the scene reads a file that is neither below the root nor among `trusted`, or a device, a
-  /// pipeline or an address that is not among `trusted`.
-  void require_holds_all(const SceneFile& scene, const std::vector<std::string>& trusted) const;
+  /// Throws BadInput where the scene reads a file that is neither below the root nor among `trusted`, or, unless
+  /// `may_open_live`, a device, a pipeline or an address that is not among `trusted`.
+  void require_holds_all(const SceneFile& scene, const std::vector<std::string>& trusted, bool may_open_live) const;
 
  private:
   std::filesystem::path folder_;

@@ -38,15 +38,16 @@ ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built
 
 struct Run::State {
   State(const SceneFile& s, const BuiltMap& built, const std::filesystem::path& folder, Truths truths,
-        const RunControl& options)
+        const RunControl& options, std::shared_ptr<Recording> live)
       : scene_file(s),
         stopped(options.stopped),
         streams(make_streams(s, built)),
         estimator(make_estimator(s, built, &streams)),
-        recording(s.scene.recording),
-        playback(recording, options.realtime, options.stopped) {
+        recording(live ? std::move(live) : std::make_shared<Recording>(s.scene.recording)),
+        playback(*recording, options.realtime, options.stopped) {
+    recording->count_anew();
     begin_results(folder);
-    files.emplace(s, folder, built, recording, std::move(truths), streams);
+    files.emplace(s, folder, built, *recording, std::move(truths), streams);
     files->losses.attempt([&] { write_map_files(built, folder); });
   }
 
@@ -54,14 +55,20 @@ struct Run::State {
     std::optional<PlayedFrame> played = playback.next();
     if (!played) return std::nullopt;
     last = played->frame;
-    return files->add(*played, played->passed_over ? passed_over(played->frame) : estimator->update(played->frame));
+    return files->add(*played, answer_to(*played));
+  }
+
+  ForceEstimate answer_to(const PlayedFrame& played) {
+    if (played.passed_over) return not_looked_at(played.frame, "frame_passed_over");
+    const bool shows_nothing = played.frame.left.empty() && played.frame.right.empty();
+    return shows_nothing ? not_looked_at(played.frame, "source_lost") : estimator->update(played.frame);
   }
 
   const SceneFile& scene_file;
   std::function<bool()> stopped;
   StreamHub streams;
   std::optional<ForceEstimator> estimator;
-  Recording recording;
+  std::shared_ptr<Recording> recording;
   Playback playback;
   std::optional<RunFiles> files;
   StereoFrame last;
@@ -69,8 +76,8 @@ struct Run::State {
 };
 
 Run::Run(const SceneFile& scene_file, const BuiltMap& built, const std::filesystem::path& folder, Truths truths,
-         const RunControl& options)
-    : state_(std::make_unique<State>(scene_file, built, folder, std::move(truths), options)) {}
+         const RunControl& options, std::shared_ptr<Recording> live)
+    : state_(std::make_unique<State>(scene_file, built, folder, std::move(truths), options, std::move(live))) {}
 
 Run::~Run() = default;
 
@@ -86,7 +93,7 @@ std::optional<RunFrame> Run::next() {
   s.over = !shown;
   if (shown && s.stopped()) {
     s.over = true;
-    s.files->losses.add(fmt::format("interrupted after frame {}", shown->estimate.frame));
+    if (!s.recording->is_live()) s.files->losses.add(fmt::format("interrupted after frame {}", shown->estimate.frame));
   }
   return shown;
 }
@@ -97,11 +104,16 @@ void Run::take_map(const BuiltMap& built) {
 }
 
 void Run::close() {
+  state_->files->dropped = dropped();
   state_->files->close();
 }
 
+int Run::dropped() const {
+  return state_->recording->dropped();
+}
+
 int Run::frame_count() const {
-  return state_->recording.frame_count();
+  return state_->recording->frame_count();
 }
 
 const RunFiles& Run::files() const {

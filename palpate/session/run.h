@@ -24,13 +24,14 @@ ForceEstimator make_estimator(const SceneFile& scene_file, const BuiltMap& built
 class Run {
  public:
   /// Empties `folder` of earlier results, writes the map's files and begins the others. `scene_file` and `built` have
-  /// to live as long. Throws BadInput, Unfinished.
+  /// to live as long. `live`: a live source that is open already; a recording is read from its beginning. Throws
+  /// BadInput, Unfinished.
   Run(const SceneFile& scene_file, const BuiltMap& built, const std::filesystem::path& folder, Truths truths,
-      const RunControl& options);
+      const RunControl& options, std::shared_ptr<Recording> live = nullptr);
   ~Run();
 
   /// The next frame, its answer on the disk; nothing at the end, which is also where the recording spoils, the disk is
-  /// full or it is stopped: the losses say which.
+  /// full or it is stopped: the losses say which. To be stopped is how a live source ends, and no loss.
   std::optional<RunFrame> next();
 
   /// Goes on from another map of the same recording, which has to live as long: its frame is the state at rest.
@@ -41,6 +42,7 @@ class Run {
   void close();
 
   int frame_count() const;  ///< -1 when unknown
+  int dropped() const;      ///< frames of a live source that a newer one replaced before they were looked at
   const RunFiles& files() const;
   const StreamHub& streams() const;
   /// Both pictures of the last frame.

@@ -11,9 +11,12 @@ namespace palpate {
 
 namespace {
 
-constexpr int kReportPictures = 6;
+constexpr int kReportPictures = 6, kEvery_frames = 25;
+constexpr size_t kMostKept = 64;
 
-std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows) {
+std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows,
+                     int dropped) {
+  scene_file.dropped_frames = dropped;
   scene_file.peak_force_per_modulus_N_per_kPa = peak_per_modulus(rows, scene_file.scene.tissue);
   scene_file.has_run = scene_file.scene.has_tuning = true;
   scene_file.rectified_from_left = rectification.rectified_from_left;
@@ -45,10 +48,15 @@ Vec3 peak_per_modulus(const std::vector<ForceRow>& rows, const TissueOptions& ti
 }
 
 PictureChoice::PictureChoice(int frames, std::string unit)
-    : every_(std::max(1, frames / (2 * kReportPictures))), unit_(std::move(unit)) {}
+    : every_(frames < 0 ? kEvery_frames : std::max(1, frames / (2 * kReportPictures))), unit_(std::move(unit)) {}
 
 void PictureChoice::offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
   if (estimate.frame % every_ != 0) return;
+  if (pictures_.size() >= kMostKept) {
+    every_ *= 2;
+    for (size_t i = 0; 2 * i < pictures_.size(); ++i) pictures_[i] = std::move(pictures_[2 * i]);
+    pictures_.resize(pictures_.size() / 2);
+  }
   pictures_.push_back({estimate.force_N.norm(), {overlay.clone(), caption(estimate, unit_)}});
 }
 
@@ -75,13 +83,16 @@ RunFiles::RunFiles(const SceneFile& s, const std::filesystem::path& f, const Bui
       painter(b.rectification, s.scene.tissue, s.overlay),
       pictures(recording.frame_count(), force_unit(s.scene.tissue)),
       streams(hub) {
-  losses.attempt([&] { write_whole_file(folder / "run.yaml", run_yaml(scene_file, built.rectification, {})); });
+  losses.attempt([&] { write_whole_file(folder / "run.yaml", run_yaml(scene_file, built.rectification, {}, 0)); });
   losses.attempt([&] { overlay.emplace(folder / "overlay.mp4", recording.fps(), recording.size()); });
 }
 
 RunFrame RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   Stopwatch watch;
-  const cv::Mat picture = painter.paint(played.frame.left, estimate);
+  // A source that is silent shows nothing, not what it showed last.
+  const cv::Mat& left = played.frame.left;
+  const cv::Mat picture =
+      painter.paint(left.empty() ? cv::Mat::zeros(built.rectification.size, CV_8UC3) : left, estimate);
   estimate.times.draw_ms = watch.lap_ms();
   for (ForceEstimate& other : estimate.further) other.times = estimate.times;
   if (!played.passed_over) streams.publish(estimate, picture, played.decoded_ns);
@@ -92,7 +103,7 @@ RunFrame RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   pictures.offer(picture, estimate);
   rows.push_back(to_row(estimate));
   times.push_back(estimate.times);
-  return {std::move(estimate), picture, played.decoded_ns};
+  return {std::move(estimate), picture, played.taken_ns, played.decoded_ns};
 }
 
 void RunFiles::close() {
@@ -108,7 +119,7 @@ void RunFiles::close() {
     for (ForceRow& row : *truth) row.time_s = row.frame / built.fps;
   report.times = times;
   report.tissue = scene_file.scene.tissue;
-  report.settings = run_yaml(scene_file, built.rectification, rows);
+  report.settings = run_yaml(scene_file, built.rectification, rows, dropped);
   report.pictures = pictures.chosen();
   losses.attempt([&] { write_whole_file(folder / "run.yaml", report.settings); });
   losses.attempt([&] { write_report(folder / "report.html", report); });

@@ -34,6 +34,7 @@ Vec3 peak_per_modulus(const std::vector<ForceRow>& rows, const TissueOptions& ti
 /// The frames worth a picture in the report: spread over the contact, or over the run where there is none.
 class PictureChoice {
  public:
+  /// `frames` of the run; -1 = nobody knows.
   PictureChoice(int frames, std::string unit);
 
   void offer(const cv::Mat& overlay, const ForceEstimate& estimate);
@@ -53,7 +54,8 @@ class PictureChoice {
 struct RunFrame {
   ForceEstimate estimate;
   cv::Mat overlay;         ///< 8-bit BGR, the left image as recorded with stress, force and readings; shared
-  int64_t decoded_ns = 0;  ///< steady clock, when both pictures were there
+  int64_t taken_ns = 0;    ///< steady clock: of a live source by its stamp, else as decoded_ns
+  int64_t decoded_ns = 0;  ///< when both pictures were there
 };
 
 /// Everything that grows frame by frame, and the page that is made of it at the end, whatever the end is.
@@ -82,6 +84,7 @@ struct RunFiles {
   StreamHub& streams;
   std::vector<ForceRow> rows;
   std::vector<FrameTimes> times;
+  int dropped = 0;  ///< frames of a live source that were not looked at; to be told before the end
 };
 
 }  // namespace palpate

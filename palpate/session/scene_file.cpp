@@ -27,6 +27,8 @@ void describe(Settings& settings, SceneFile& scene_file) {
                       "axes of the rectified pair in the left camera frame, row by row");
         group.vector3("peak_force_per_modulus_N_per_kPa", scene_file.peak_force_per_modulus_N_per_kPa, {0, 1e9},
                       "greatest force over E, and its 95 % band: [value, low, high]");
+        group.integer("dropped_frames", scene_file.dropped_frames, {0, 2e9},
+                      "frames of a live source in whose place a newer one was looked at");
       },
       &scene_file.has_run);
 }

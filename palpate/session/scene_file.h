@@ -20,6 +20,7 @@ struct SceneFile {
   Mat3 rectified_from_left = Mat3::Identity();  ///< what a run found; written into run.yaml, without effect when read
   /// Greatest force over E as [value, 2.5 %, 97.5 %], N per kPa: does not depend on the E assumed.
   Vec3 peak_force_per_modulus_N_per_kPa = Vec3::Zero();
+  int dropped_frames = 0;
   bool has_recording = false;
   bool has_simulate = false;
   bool has_streams = false;

@@ -11,20 +11,23 @@
 #include <sstream>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/source_kind.h"
 #include "palpate/core/whole_file.h"
-#include "palpate/session/open_source.h"
 #include "palpate/session/run.h"
 #include "palpate/session/run_folder.h"
 #include "palpate/session/scene_text.h"
 #include "palpate/session/shape.h"
-#include "palpate/stream/clock.h"
+#include "palpate/session/source_view.h"
 
 namespace palpate {
 
 namespace {
 
 constexpr size_t kMostEditsKept = 500;
+/// A live source is shown as often where nothing runs.
+constexpr auto kBetweenLooks = std::chrono::milliseconds(250);
 
 bool is_passed_over(const ForceEstimate& estimate) {
   return std::find(estimate.warnings.begin(), estimate.warnings.end(), "frame_passed_over") != estimate.warnings.end();
@@ -72,12 +75,15 @@ struct Session::State {
   bool ended = false;
   std::atomic<bool> stop{false};
   mutable std::mutex published_mutex;
-  SharedSnapshot published = std::make_shared<Snapshot>();
+  SharedSnapshot published;
 
   Snapshot now;
   std::vector<std::string> undo, redo;
   std::string saved_text, built_text;
   std::vector<std::string> trusted;
+  std::shared_ptr<Recording> live;  ///< nothing where the scene's source is none
+  std::unique_ptr<LiveRecorder> recorder;
+  uint64_t pictures = 0;
   std::shared_ptr<const SceneFile> run_scene;
   std::vector<std::shared_ptr<const BuiltMap>> run_maps;  ///< outlive the run that was begun with them
   std::unique_ptr<Run> run;
@@ -85,7 +91,10 @@ struct Session::State {
   std::unique_ptr<ShapeWriter> shapes;  ///< nothing where the disk takes no more
   std::thread thread;
 
-  State(RootFolder r, std::function<void()> c) : root(std::move(r)), on_change(std::move(c)) {}
+  State(RootFolder r, std::function<void()> c, bool may_open_live) : root(std::move(r)), on_change(std::move(c)) {
+    now.may_open_live = may_open_live;
+    published = std::make_shared<const Snapshot>(now);
+  }
 
   void publish() {
     ++now.version;
@@ -93,6 +102,7 @@ struct Session::State {
     now.can_undo = !undo.empty();
     now.can_redo = !redo.empty();
     now.map_is_stale = now.map && now.scene_text != built_text;
+    if (recorder) now.kept = recorder->view();
     auto next = std::make_shared<const Snapshot>(now);
     {
       const std::lock_guard lock(published_mutex);
@@ -114,13 +124,34 @@ struct Session::State {
     if (is_trusted)
       trusted = sources_of(scene);
     else
-      root.require_holds_all(scene, trusted);
+      root.require_holds_all(scene, trusted, now.may_open_live);
     const std::string before = now.source ? recording_text(now.scene) : "";
-    if (before != recording_text(scene) || file != now.scene_file)
-      now.source = open_source(scene, std::max(0, scene.scene.map.frame));
+    if (before != recording_text(scene) || file != now.scene_file) {
+      if (recorder) throw BadInput("the video of the live source is being recorded, expected that to end first");
+      live.reset();  // a camera can be opened once only
+      take_source(scene, std::max(0, scene.scene.map.frame));
+    }
     now.scene = scene;
     now.scene_text = text;
     now.scene_file = file;
+  }
+
+  void take_source(const SceneFile& scene, int frame) {
+    const std::shared_ptr<Recording> recording = live ? live : open_recording(scene);
+    auto view = std::make_shared<SourceView>(view_source(scene, *recording, frame));
+    view->number = ++pictures;
+    now.source = std::move(view);
+    live = recording->is_live() ? recording : nullptr;
+  }
+
+  bool is_live() const { return now.source && now.source->timing.is_live; }
+
+  /// From its beginning; a live one as it is.
+  std::shared_ptr<Recording> opened() {
+    if (live) return live;
+    std::shared_ptr<Recording> recording = open_recording(now.scene);
+    if (recording->is_live()) live = recording;
+    return recording;
   }
 
   void open(const std::filesystem::path& file, const std::string& text, bool is_saved, bool is_trusted) {
@@ -140,9 +171,11 @@ struct Session::State {
   }
 
   void obey(const ask::OpenRecording& asked) {
-    const std::filesystem::path folder = root.inside(asked.stereo.empty() ? asked.left : asked.stereo).parent_path();
+    const std::string& first = asked.stereo.empty() ? asked.left : asked.stereo;
+    const auto is_file = [](const std::string& name) { return kind_of_source(name) == SourceKind::file; };
+    const std::filesystem::path folder = root.inside(is_file(first) ? first : asked.calibration).parent_path();
     const auto relative = [&](const std::string& name) {
-      return name.empty() ? name : root.inside(name).lexically_relative(folder).string();
+      return name.empty() || !is_file(name) ? name : root.inside(name).lexically_relative(folder).string();
     };
     const std::string text = new_scene_text(relative(asked.left), relative(asked.right), relative(asked.stereo),
                                             relative(asked.calibration));
@@ -152,7 +185,7 @@ struct Session::State {
   void obey(const ask::Look& asked) {
     require_scene();
     require_no_run();
-    now.source = open_source(now.scene, asked.frame);
+    take_source(now.scene, asked.frame);
   }
 
   void obey(const ask::Edit& asked) {
@@ -217,7 +250,7 @@ struct Session::State {
     int64_t begun = steady_ns();
     BuildWatch watch;
     watch.on_stage = watch_stages(begun);
-    auto built = std::make_shared<const BuiltMap>(build_map(now.scene, watch));
+    auto built = std::make_shared<const BuiltMap>(build_map(now.scene, *opened(), watch));
     end_stage(begun);
     now.map = std::move(built);
     ++now.map_number;
@@ -236,7 +269,8 @@ struct Session::State {
     run_scene = std::make_shared<const SceneFile>(now.scene);
     run_maps = {now.map};
     run = std::make_unique<Run>(*run_scene, *now.map, view.folder, Truths{},
-                                RunControl{asked.realtime, [this] { return stop.load(); }});
+                                RunControl{asked.realtime, [this] { return stop.load(); }},
+                                is_live() ? opened() : nullptr);
     view.frame_count = run->frame_count();
     keep_shape([&] { shapes = std::make_unique<ShapeWriter>(view.folder / "shapes.bin", *now.map); });
     view.rows = rows = std::make_shared<RowLog>();
@@ -266,6 +300,21 @@ struct Session::State {
     obey(ask::Mark{"map built again from this frame"});
   }
 
+  void obey(const ask::Record& asked) {
+    require_scene();
+    if (!asked.on) {
+      if (recorder) now.kept = recorder->close();
+      recorder.reset();
+      return;
+    }
+    if (!is_live()) throw BadInput("the source is a recording already, expected a live one");
+    if (recorder) throw BadInput("the video is being recorded already");
+    const bool is_map_of_scene = now.map && now.scene_text == built_text;
+    recorder =
+        std::make_unique<LiveRecorder>(opened(), now.scene, now.scene_text, is_map_of_scene ? now.map.get() : nullptr,
+                                       free_file(root.path() / "recordings", now.scene_file.stem().string(), ""));
+  }
+
   /// Where a command leads back to, whether it was obeyed or not.
   Phase phase_at_rest() const { return run ? Phase::running : now.source ? Phase::ready : Phase::idle; }
 
@@ -276,8 +325,10 @@ struct Session::State {
     } catch (const std::exception& error) {
       sentence = error.what();
     }
-    // An edit that is refused is told to who made it, and is no failure of the session.
-    const bool fails = !sentence.empty() && !std::holds_alternative<ask::Edit>(asked.command);
+    // An edit or a recording that is refused is told to who asked, and is no failure of the session.
+    const bool is_aside =
+        std::holds_alternative<ask::Edit>(asked.command) || std::holds_alternative<ask::Record>(asked.command);
+    const bool fails = !sentence.empty() && !is_aside;
     if (fails || sentence.empty()) {
       now.phase = fails && !run ? Phase::failed : phase_at_rest();
       now.sentence = fails ? sentence : "";
@@ -298,6 +349,7 @@ struct Session::State {
 
   void step_run() {
     std::optional<RunFrame> frame = run->next();
+    now.run->dropped = run->dropped();
     if (frame) {
       const ForceEstimate& estimate = frame->estimate;
       rows->add(run->files().rows.back());
@@ -313,6 +365,24 @@ struct Session::State {
       return;
     }
     end_run();
+    publish();
+  }
+
+  /// The live source as it is at this moment.
+  void look() {
+    const std::optional<StereoFrame> frame = live->next();
+    if (!frame) {
+      live.reset();
+      return;
+    }
+    auto view = std::make_shared<SourceView>(*now.source);
+    view->is_silent = frame->left.empty();
+    if (!view->is_silent) {
+      view->frame = *frame;
+      view->pair = frame->right.empty() ? RectifiedPair{} : rectify(view->rectification, *frame);
+      view->number = ++pictures;
+    }
+    now.source = std::move(view);
     publish();
   }
 
@@ -332,7 +402,11 @@ struct Session::State {
       std::optional<Asked> asked;
       {
         std::unique_lock lock(mutex);
-        if (!run) woken.wait(lock, [this] { return ended || !queue.empty(); });
+        const auto is_asked = [this] { return ended || !queue.empty(); };
+        if (!run && live)
+          woken.wait_for(lock, kBetweenLooks, is_asked);
+        else if (!run)
+          woken.wait(lock, is_asked);
         if (ended) break;
         if (!queue.empty()) {
           asked = std::move(queue.front());
@@ -341,15 +415,18 @@ struct Session::State {
       }
       if (asked)
         obey(*asked);
-      else
+      else if (run)
         step_run();
+      else if (live)
+        look();
     }
     if (run) end_run();
+    recorder.reset();
   }
 };
 
-Session::Session(RootFolder root, std::function<void()> on_change)
-    : state_(std::make_unique<State>(std::move(root), std::move(on_change))) {
+Session::Session(RootFolder root, std::function<void()> on_change, bool may_open_live)
+    : state_(std::make_unique<State>(std::move(root), std::move(on_change), may_open_live)) {
   state_->thread = std::thread([this] { state_->work(); });
 }
 

@@ -19,6 +19,7 @@ struct OpenScene {
   std::string file;
 };
 /// A scene of its own, around a recording: left and right, or stereo alone.
+/// The names may be those of live sources; the scene stands beside the calibration then.
 struct OpenRecording {
   std::string left, right, stereo, calibration;
 };
@@ -46,17 +47,22 @@ struct Mark {
 };
 /// The frame that a run has come to is the state at rest: the map is built again from it, and the run goes on.
 struct Rest {};
+/// Begins or ends to keep the video of a live source.
+struct Record {
+  bool on = true;
+};
 }  // namespace ask
 
 using Command = std::variant<ask::OpenScene, ask::OpenRecording, ask::Look, ask::Edit, ask::Undo, ask::Redo, ask::Save,
-                             ask::Build, ask::Start, ask::Stop, ask::Mark, ask::Rest>;
+                             ask::Build, ask::Start, ask::Stop, ask::Mark, ask::Rest, ask::Record>;
 
 /// Source, scene, map, estimator and results as one state machine, on a thread of its own: commands go in, snapshots
-/// come out. It never waits for who looks at it; the newest snapshot wins.
+/// come out. It never waits for who looks at it; the newest snapshot wins. A live source is open as long as its scene.
 class Session {
  public:
-  /// `on_change` is called from the session's thread after each new snapshot and must not wait.
-  Session(RootFolder root, std::function<void()> on_change);
+  /// `on_change` is called from the session's thread after each new snapshot and must not wait. `may_open_live`:
+  /// devices, pipelines and addresses too.
+  Session(RootFolder root, std::function<void()> on_change, bool may_open_live = false);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;

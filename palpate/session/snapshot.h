@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/session/built_map.h"
+#include "palpate/session/live_recorder.h"
 #include "palpate/session/row_log.h"
 #include "palpate/session/run_files.h"
 
@@ -29,6 +30,8 @@ struct SourceView {
   Rectification rectification;
   StereoFrame frame;
   RectifiedPair pair;
+  bool is_silent = false;  ///< a live source that gives no pictures at the moment; the frame is the last one
+  uint64_t number = 0;     ///< another one for each frame
 };
 
 struct StageTime {
@@ -48,6 +51,7 @@ struct RunView {
   bool over = false;
   std::string end;  ///< why it ended before the recording did; empty = it did not
   int passed_over = 0;
+  int dropped = 0;  ///< frames of a live source in whose place a newer one was looked at
   std::vector<RunMark> marks;
   std::shared_ptr<const RowLog> rows;
   std::shared_ptr<const RunFrame> shown;  ///< the newest; nothing before the first
@@ -70,6 +74,8 @@ struct Snapshot {
   uint64_t map_number = 0;    ///< another one for each map
   bool map_is_stale = false;  ///< the scene has changed since
   std::optional<RunView> run;
+  bool may_open_live = false;    ///< devices, pipelines and addresses that no trusted scene names
+  std::optional<KeptView> kept;  ///< of a live source, the last time
 };
 using SharedSnapshot = std::shared_ptr<const Snapshot>;
 

@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/source_kind.h"
 #include "palpate/stereo/times_file.h"
 
 namespace palpate {
@@ -117,18 +118,15 @@ class ImageFiles : public FrameSource {
   size_t next_ = 0;
 };
 
-/// What comes in while it is read: device, GStreamer pipeline, address.
-class LiveSource : public FrameSource {
+/// What OpenCV finds behind an address.
+class AddressSource : public FrameSource {
  public:
-  /// A camera does not end by itself; a pipeline may, and what is behind an address where its length is known.
-  LiveSource(const cv::VideoCapture& capture, const std::string& name, const std::string& key, bool is_pipeline)
-      : capture_(capture),
-        name_(name),
-        key_(key),
-        never_ends_(!is_pipeline && !(capture.get(cv::CAP_PROP_FRAME_COUNT) > 0)) {
+  AddressSource(const std::string& address, const std::string& key) : capture_(address), address_(address), key_(key) {
+    if (!capture_.isOpened()) throw BadInput(fmt::format("{}: {} cannot be opened as a video", key, address));
     if (!capture_.read(first_) || first_.empty())
-      throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, name));
+      throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, address));
     size_ = first_.size();
+    has_end_ = capture_.get(cv::CAP_PROP_FRAME_COUNT) > 0;
   }
   std::optional<Frame> next() override {
     Frame frame;  // a fresh image each time: frames are handed on without copying
@@ -138,11 +136,11 @@ class LiveSource : public FrameSource {
       return frame;
     }
     if (capture_.read(frame.image) && !frame.image.empty()) return frame;
-    if (never_ends_) throw Unfinished(fmt::format("{}: {} gives no more pictures", key_, name_));
+    if (!has_end_) throw Unfinished(fmt::format("{}: {} gives no more pictures", key_, address_));
     return std::nullopt;
   }
   cv::Size size() const override { return size_; }
-  std::string clock() const override { return "live"; }
+  std::string clock() const override { return "address"; }
   const std::vector<double>& stamps_s() const override { return none_; }
   double stated_fps() const override {
     const double rate = capture_.get(cv::CAP_PROP_FPS);
@@ -151,8 +149,8 @@ class LiveSource : public FrameSource {
 
  private:
   cv::VideoCapture capture_;
-  std::string name_, key_;
-  bool never_ends_;
+  std::string address_, key_;
+  bool has_end_ = false;
   cv::Mat first_;
   cv::Size size_;
   std::vector<double> none_;
@@ -162,22 +160,7 @@ class LiveSource : public FrameSource {
 
 std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps) {
   const std::string name = path.string();
-  const bool is_device = name.find_first_not_of("0123456789") == std::string::npos;
-  const bool is_pipeline = name.find(" ! ") != std::string::npos;
-  const bool is_address = name.find("://") != std::string::npos;
-  if (is_device || is_pipeline || is_address) {
-    cv::VideoCapture capture;
-    if (is_device)
-      capture.open(std::stoi(name));
-    else
-      capture.open(name, is_pipeline ? cv::CAP_GSTREAMER : cv::CAP_ANY);
-    if (!capture.isOpened())
-      throw BadInput(fmt::format("{}: {} cannot be opened as a {}", key, name,
-                                 is_device     ? "camera device"
-                                 : is_pipeline ? "GStreamer pipeline"
-                                               : "video"));
-    return std::make_unique<LiveSource>(capture, name, key, is_pipeline);
-  }
+  if (kind_of_source(name) == SourceKind::address) return std::make_unique<AddressSource>(name, key);
   std::error_code ignored;
   if (has_placeholder(path) && !std::filesystem::exists(path, ignored)) {
     std::vector<NumberedFile> files = files_of_pattern(path);

@@ -15,7 +15,7 @@ class FrameSource {
  public:
   struct Frame {
     cv::Mat image;      ///< 8-bit BGR
-    double time_s = 0;  ///< presentation stamp; of a live source, 0
+    double time_s = 0;  ///< presentation stamp; of an address, 0
   };
 
   virtual ~FrameSource() = default;
@@ -23,7 +23,7 @@ class FrameSource {
   virtual cv::Size size() const = 0;
   /// By which stamps can be compared with those of another source: "mpegts", "numbers", ...
   virtual std::string clock() const = 0;
-  /// Of every frame, ascending; empty = not known (live sources).
+  /// Of every frame, ascending; empty = not known (addresses).
   virtual const std::vector<double>& stamps_s() const = 0;
   /// Frames per second that the source states; 0 = none.
   virtual double stated_fps() const = 0;

@@ -93,7 +93,12 @@ std::vector<InputKind> recording_kinds() {
        "or 16 bits; a name that is there as it stands is a file"},
       {"both cameras in one picture", "da Vinci, 3D recorders", "`stereo` with `layout: side-by-side` or `top-bottom`"},
       {"interlaced pictures", "3D recorders, HD-SDI", "said; `deinterlace: true` keeps the even rows"},
-      {"live", "V4L2, GStreamer, RTSP", "device number, pipeline or address, as OpenCV opens them; times are counted"},
+      {"live", "V4L2, DeckLink, RTSP and RTP, whatever GStreamer reads",
+       "a device (`0`, `/dev/video0`), a GStreamer pipeline (`a ! b`) or an `rtsp://` address for each camera, or for "
+       "both in one picture; both in one pipeline and clock, paired by stamp, the newest pair wins, what was dropped "
+       "is "
+       "counted; a source that stops gives `source_lost` until it comes back ([console](console.md#live))"},
+      {"addresses", "HTTP, UDP", "other addresses as OpenCV opens them; times are counted"},
   };
 }
 

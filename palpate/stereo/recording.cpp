@@ -8,6 +8,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/stereo/frame_source.h"
 #include "palpate/stereo/interlacing.h"
+#include "palpate/stereo/live_stereo.h"
 #include "palpate/stereo/quiet_opencv.h"
 #include "palpate/stereo/stamp_pairing.h"
 
@@ -47,14 +48,16 @@ cv::Size eye_size_of(const RecordingOptions& options, cv::Size both) {
 }  // namespace
 
 void describe(Settings& settings, RecordingOptions& options) {
-  settings.path("left", options.left,
-                "video of the left eye: file, image pattern (left_%04d.png), device number, GStreamer pipeline");
-  settings.path("right", options.right, "video of the right eye");
-  settings.path("stereo", options.stereo, "one video that holds both eyes, instead of left and right");
+  settings.path(
+      "left", options.left,
+      "video of the left camera: file or image pattern (left_%04d.png); live: device (0, /dev/video0), GStreamer "
+      "pipeline (a ! b), rtsp:// address");
+  settings.path("right", options.right, "video of the right camera");
+  settings.path("stereo", options.stereo, "one video that holds both cameras, instead of left and right");
   settings.choice<StereoLayout>(
       "layout", options.layout,
       {{"side-by-side", StereoLayout::side_by_side}, {"top-bottom", StereoLayout::top_bottom}},
-      "where the eyes stand in the stereo video; the left one is left or on top");
+      "where the cameras stand in the stereo video; the left one is left or on top");
   settings.flag("swap", options.swap, "exchange left and right");
   settings.flag("deinterlace", options.deinterlace,
                 "replace every second row by what its neighbours show, where they are of another moment");
@@ -93,6 +96,10 @@ struct Recording::Sources {
   size_t right_images_read = 0;
   double first_stamp_s = 0;
   std::vector<std::string> notes;
+  int64_t taken_ns = 0;
+  int dropped_before = 0;
+  std::optional<int64_t> first_stamp_ns;
+  std::unique_ptr<LiveStereo> live;  // instead of first and second
 
   StereoFrame split(const cv::Mat& both) const {
     StereoFrame frame;
@@ -103,7 +110,34 @@ struct Recording::Sources {
     return frame;
   }
 
-  bool is_live() const { return first->stamps_s().empty() || (second && second->stamps_s().empty()); }
+  /// As the options say what the cameras show.
+  void arrange(StereoFrame& frame) const {
+    if (options.deinterlace)
+      for (cv::Mat* image : {&frame.left, &frame.right})
+        if (!image->empty()) *image = deinterlaced(*image);
+    if (options.swap) std::swap(frame.left, frame.right);
+  }
+
+  StereoFrame arranged(const LivePair& pair) const {
+    const bool is_both = !options.stereo.empty() && !pair.left.empty();
+    StereoFrame frame = is_both ? split(pair.left) : StereoFrame{0, 0, pair.left, pair.right};
+    arrange(frame);
+    return frame;
+  }
+
+  std::optional<StereoFrame> next_live() {
+    const std::optional<LivePair> pair = live->next();
+    if (!pair) return std::nullopt;
+    StereoFrame frame = arranged(*pair);
+    taken_ns = pair->taken_ns;
+    if (!first_stamp_ns) first_stamp_ns = pair->stamp_ns;
+    frame.index = index++;
+    frame.time_s = static_cast<double>(pair->stamp_ns - *first_stamp_ns) * 1e-9;
+    return frame;
+  }
+
+  /// Frames come without stamps, from an address.
+  bool has_no_stamps() const { return first->stamps_s().empty() || (second && second->stamps_s().empty()); }
 
   void read_right() {
     right = second->next();
@@ -173,6 +207,23 @@ std::vector<std::string> notes_of(const RecordingTiming& timing, double frames, 
   return notes;
 }
 
+/// Empty where the recording lies in files.
+std::vector<LiveCameras::Camera> live_cameras(const RecordingOptions& options) {
+  std::vector<LiveCameras::Camera> cameras, files;
+  const auto sort = [&](const std::filesystem::path& name, const char* key) {
+    (pipeline_of(name.string()).empty() ? files : cameras).push_back({name.string(), key});
+  };
+  if (options.stereo.empty()) {
+    sort(options.left, "recording.left");
+    sort(options.right, "recording.right");
+  } else {
+    sort(options.stereo, "recording.stereo");
+  }
+  if (!cameras.empty() && !files.empty())
+    throw BadInput(fmt::format("{} is live and {} is not, expected both to be", cameras[0].key, files[0].key));
+  return cameras;
+}
+
 }  // namespace
 
 Recording::Recording(const RecordingOptions& options) : sources_(std::make_unique<Sources>()) {
@@ -180,6 +231,15 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   const QuietOpenCv quiet;
   Sources& s = *sources_;
   s.options = options;
+  if (const std::vector<LiveCameras::Camera> cameras = live_cameras(options); !cameras.empty()) {
+    s.live = std::make_unique<LiveStereo>(cameras);
+    s.eye_size = options.stereo.empty() ? s.live->size() : eye_size_of(options, s.live->size());
+    s.fps = options.fps > 0 ? options.fps : s.live->stated_fps();
+    if (!(s.fps > 0)) s.fps = kFallbackFps;
+    s.pairing.timing.is_live = true;
+    s.pairing.timing.rate_Hz = s.fps;
+    return;
+  }
   if (options.stereo.empty()) {
     s.first = open_frame_source(options.left, "recording.left", options.fps);
     s.second = open_frame_source(options.right, "recording.right", options.fps);
@@ -192,7 +252,7 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   const std::vector<double>& stamps = s.first->stamps_s();
   if (!stamps.empty()) s.first_stamp_s = stamps.front();
   s.pairing.timing = timing_of(stamps);
-  if (s.second && !s.is_live()) {
+  if (s.second && !s.has_no_stamps()) {
     s.pairing = pair_by_stamp(stamps, s.second->stamps_s(), s.first->clock() == s.second->clock());
     if (s.pairing.timing.left_without_right == static_cast<int>(stamps.size()))
       throw BadInput(
@@ -216,13 +276,14 @@ Recording::Recording(Recording&&) noexcept = default;
 
 std::optional<StereoFrame> Recording::next() {
   Sources& s = *sources_;
+  if (s.live) return s.next_live();
   const QuietOpenCv quiet;
   std::optional<FrameSource::Frame> first = s.first->next();
   std::optional<FrameSource::Frame> second;
-  if (s.second && s.is_live()) second = s.second->next();
-  const bool ended = !first || (s.second && s.is_live() && !second);
+  if (s.second && s.has_no_stamps()) second = s.second->next();
+  const bool ended = !first || (s.second && s.has_no_stamps() && !second);
   const bool right_is_cut =
-      s.second && !s.is_live() && !s.right && s.right_has_ended() && s.second->frames_if_whole() > 0;
+      s.second && !s.has_no_stamps() && !s.right && s.right_has_ended() && s.second->frames_if_whole() > 0;
   if (ended || right_is_cut) {
     const FrameSource& source = ended ? *s.first : *s.second;
     if (const int whole = source.frames_if_whole(); whole > 0)
@@ -238,11 +299,8 @@ std::optional<StereoFrame> Recording::next() {
   if (!s.second)
     frame = s.split(first->image);
   else
-    frame = {0, 0, first->image, s.is_live() ? second->image : s.right_image_at(first->time_s)};
-  if (s.options.deinterlace)
-    for (cv::Mat* image : {&frame.left, &frame.right})
-      if (!image->empty()) *image = deinterlaced(*image);
-  if (s.options.swap) std::swap(frame.left, frame.right);
+    frame = {0, 0, first->image, s.has_no_stamps() ? second->image : s.right_image_at(first->time_s)};
+  s.arrange(frame);
   frame.index = s.index++;
   const bool by_stamp = !s.first->stamps_s().empty() && s.options.fps <= 0;
   frame.time_s = by_stamp ? first->time_s - s.first_stamp_s : frame.index / s.fps;
@@ -260,6 +318,30 @@ int Recording::frame_count() const {
 }
 const RecordingTiming& Recording::timing() const {
   return sources_->pairing.timing;
+}
+bool Recording::is_live() const {
+  return sources_->live != nullptr;
+}
+int64_t Recording::taken_ns() const {
+  return sources_->taken_ns;
+}
+int Recording::dropped() const {
+  return sources_->live ? sources_->live->dropped() - sources_->dropped_before : 0;
+}
+void Recording::count_anew() {
+  if (!sources_->live) return;
+  sources_->index = 0;
+  sources_->first_stamp_ns.reset();
+  sources_->dropped_before = sources_->live->dropped();
+}
+void Recording::listen(std::function<void(const StereoFrame&)> listener) {
+  if (!sources_->live) return;
+  if (!listener) return sources_->live->listen({});
+  sources_->live->listen([sources = sources_.get(), listener = std::move(listener)](const LivePair& pair) {
+    StereoFrame frame = sources->arranged(pair);
+    frame.time_s = static_cast<double>(pair.stamp_ns) * 1e-9;
+    listener(frame);
+  });
 }
 const std::vector<std::string>& Recording::notes() const {
   return sources_->notes;

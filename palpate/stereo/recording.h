@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,22 +37,27 @@ StereoRig read_rig(const RecordingOptions& options);
 
 /// What the time stamps of a recording say, before anything is decoded.
 struct RecordingTiming {
-  double rate_Hz = 0;          ///< of the left camera, 1 / usual step; 0 = not known (live sources, single images)
+  double rate_Hz = 0;          ///< of the left camera, 1 / usual step; 0 = not known (addresses, single images)
   double jitter_ms = 0;        ///< standard deviation of the steps that are no gaps
   int gaps = 0;                ///< steps of more than one and a half usual ones
   double longest_gap_s = 0;    ///< longest step
   double offset_ms = 0;        ///< right minus left, median over the pairs
   int left_without_right = 0;  ///< frames of the left camera, with an empty right image
   int right_without_left = 0;  ///< frames of the right camera that are left out
+  bool is_live = false;        ///< the rate is the stated one, all else is not known
 };
 
 /// Frames of a stereo recording, one after the other: video files, image patterns (left_%04d.png, %04d/left.png, names
-/// that are nanoseconds), device numbers and GStreamer pipelines. A frame's time is its presentation stamp, counted
-/// from the first left one. Left and right are paired by stamp, within half a frame; frames are those of the left
-/// camera, and where the right one has none, the right image is empty.
+/// that are nanoseconds). A frame's time is its presentation stamp, counted from the first left one. Left and right are
+/// paired by stamp, within half a frame; frames are those of the left camera, and where the right one has none, the
+/// right image is empty.
+///
+/// Devices, GStreamer pipelines and rtsp:// addresses are live: each frame is the newest, and while both cameras are
+/// silent there are frames without images.
 class Recording {
  public:
-  /// Throws BadInput: missing or empty video, left and right of different size, no frame that both have.
+  /// Throws BadInput: missing or empty video, live source that cannot be had, left and right of different size, no
+  /// frame that both have.
   explicit Recording(const RecordingOptions& options);
   ~Recording();
   Recording(Recording&&) noexcept;
@@ -63,6 +69,15 @@ class Recording {
   double fps() const;       ///< frames per second, mean over the recording
   int frame_count() const;  ///< of the left camera; -1 when unknown (live sources)
   const RecordingTiming& timing() const;
+  bool is_live() const;
+  /// Steady clock, when the last frame of a live source was taken, by its stamp; 0 = not live.
+  int64_t taken_ns() const;
+  int dropped() const;  ///< frames of a live source in whose place a newer one was given
+  /// Numbers, times and dropped frames of a live source count from its next frame on.
+  void count_anew();
+  /// Every frame of a live source from now on, from a thread of its own that must not wait; no function ends it. Their
+  /// index is 0 and their time that of the steady clock.
+  void listen(std::function<void(const StereoFrame&)> listener);
   /// Sentences about the files that a user ought to know: a varying rate, combed pictures, how left and right lie.
   const std::vector<std::string>& notes() const;
 

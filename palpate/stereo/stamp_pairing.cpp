@@ -91,6 +91,7 @@ StampPairing pair_by_stamp(const std::vector<double>& left_s, std::vector<double
 }
 
 std::string describe_timing(const RecordingTiming& timing) {
+  if (timing.is_live) return fmt::format("live, {:.2f} frames/s", timing.rate_Hz);
   if (!(timing.rate_Hz > 0)) return "rate not known";
   std::string text = fmt::format("{:.2f} frames/s, jitter {:.1f} ms", timing.rate_Hz, timing.jitter_ms);
   text += timing.gaps > 0 ? fmt::format(", {} gaps up to {:.3f} s", timing.gaps, timing.longest_gap_s) : ", no gaps";

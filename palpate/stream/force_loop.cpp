@@ -9,9 +9,9 @@
 #include <cstring>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/stream/address.h"
-#include "palpate/stream/clock.h"
 #include "palpate/stream/hand_over.h"
 #include "palpate/stream/passive_force.h"
 

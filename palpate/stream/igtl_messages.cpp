@@ -11,7 +11,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
-#include "palpate/stream/clock.h"
+#include "palpate/core/clock.h"
 
 namespace palpate {
 

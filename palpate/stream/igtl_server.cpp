@@ -14,8 +14,8 @@
 #include <mutex>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
-#include "palpate/stream/clock.h"
 #include "palpate/stream/igtl_client.h"
 
 namespace palpate {

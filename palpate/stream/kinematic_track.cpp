@@ -1,6 +1,6 @@
 #include "palpate/stream/kinematic_track.h"
 
-#include "palpate/stream/clock.h"
+#include "palpate/core/clock.h"
 #include "palpate/stream/hand_over.h"
 #include "palpate/stream/track_source.h"
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
-#include "palpate/stream/clock.h"
 #include "palpate/stream/contact_spring.h"
 #include "palpate/stream/kinematic_track.h"
 #include "palpate/stream/ros2_publisher.h"

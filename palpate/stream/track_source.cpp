@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
-#include "palpate/stream/clock.h"
 
 namespace palpate {
 

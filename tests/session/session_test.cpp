@@ -172,8 +172,10 @@ TEST_F(ASession, NothingOutsideOfItsFolderIsOpened) {
     EXPECT_THAT(ask(ask::OpenScene{name}), HasSubstr("outside of the folder")) << name;
   open();
   std::filesystem::copy(workspace_ / "in/left.avi", workspace_ / "left.avi");
-  for (const char* value : {"../left.avi", "\"videotestsrc ! appsink\"", "rtsp://host/x", "0"})
-    EXPECT_THAT(ask(ask::Edit{{{{"recording", "left"}, value}}}), HasSubstr("outside of the folder")) << value;
+  EXPECT_THAT(ask(ask::Edit{{{{"recording", "left"}, "../left.avi"}}}), HasSubstr("outside of the folder"));
+  for (const char* value : {"\"videotestsrc ! appsink\"", "rtsp://host/x", "0", "/dev/video0"})
+    EXPECT_THAT(ask(ask::Edit{{{{"recording", "left"}, value}}}), HasSubstr("is a live source")) << value;
+  EXPECT_THAT(ask(ask::OpenRecording{"a ! b", "c ! d", "", "calibration.yaml"}), HasSubstr("is a live source"));
   EXPECT_THAT(ask(ask::Save{"../x.yaml"}), HasSubstr("no name for a scene"));
   EXPECT_EQ(session_->newest()->phase, Phase::failed);
 }

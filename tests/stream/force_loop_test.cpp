@@ -6,9 +6,9 @@
 #include <chrono>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/stream/address.h"
-#include "palpate/stream/clock.h"
 #include "tests/stream/samples.h"
 
 namespace palpate {

@@ -19,9 +19,9 @@
 #include <set>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/stream/address.h"
-#include "palpate/stream/clock.h"
 #include "tests/stream/other_program.h"
 #include "tests/stream/samples.h"
 

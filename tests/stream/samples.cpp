@@ -5,8 +5,8 @@
 #include <chrono>
 #include <thread>
 
+#include "palpate/core/clock.h"
 #include "palpate/stream/address.h"
-#include "palpate/stream/clock.h"
 
 namespace palpate::test {
 

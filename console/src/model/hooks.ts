@@ -19,6 +19,12 @@ export function useNow(step_ms: number): number {
   return now;
 }
 
+/** A key that belongs to what is written, or to the browser. */
+export function isForSomethingElse(event: KeyboardEvent): boolean {
+  const isWriting = event.target instanceof HTMLElement && event.target.matches('input:not([type=checkbox], [type=range], [type=radio]), select, textarea');
+  return isWriting || event.ctrlKey || event.metaKey || event.altKey;
+}
+
 interface Keys {
   keys: KeyRow[];
   warnings: {[name: string]: string};

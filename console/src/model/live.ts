@@ -1,5 +1,5 @@
 /** The one connection to the program: its state, pictures and shapes as they come, and what it is asked for. */
-import {type Phase, type MapState, type Row, type RunState, rowOf, type SceneState, type SourceState} from './types';
+import {type KeptState, type Phase, type MapState, type Row, type RunState, rowOf, type SceneState, type SourceState} from './types';
 import {parseShape, type Shape} from './shape';
 
 export interface LiveState {
@@ -12,6 +12,8 @@ export interface LiveState {
   source: SourceState | null;
   map: MapState | null;
   run: RunState | null;
+  kept: KeptState | null;
+  mayOpenLive: boolean;
   rows: Row[];
   roundTrip_ms: number;
 }
@@ -19,7 +21,7 @@ export interface LiveState {
 export interface LivePicture {
   bitmap: ImageBitmap;
   frame: number;
-  /** Since both pictures of the frame were decoded, when it came here. */
+  /** Since both pictures of the frame were decoded (of a live source: since its stamp), when it came here. */
   ageAtArrival_ms: number;
   arrived: number;
 }
@@ -33,7 +35,7 @@ type Reply = {resolve: () => void; reject: (error: Error) => void};
 class Live {
   state: LiveState = {
     connected: false, lostSince: performance.now(), phase: 'idle', sentence: '', stages: [], scene: null, source: null,
-    map: null, run: null, rows: [], roundTrip_ms: 0,
+    map: null, run: null, kept: null, mayOpenLive: false, rows: [], roundTrip_ms: 0,
   };
   picture: LivePicture | null = null;
   shape: Shape | null = null;
@@ -106,8 +108,8 @@ class Live {
       return;
     }
     if (!('phase' in message)) return;
-    const next: Partial<LiveState> = {connected: true, lostSince: null};
-    for (const key of ['phase', 'sentence', 'stages', 'scene', 'source', 'map', 'run'] as const)
+    const next: Partial<LiveState> = {connected: true, lostSince: null, mayOpenLive: message['may_open_live'] === true};
+    for (const key of ['phase', 'sentence', 'stages', 'scene', 'source', 'map', 'run', 'kept'] as const)
       if (key in message) (next as Record<string, unknown>)[key] = message[key];
     if (!message['run']) next.rows = [];
     if (Array.isArray(message['rows'])) {

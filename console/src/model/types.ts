@@ -29,6 +29,21 @@ export interface SourceState {
   rectified_baseline_mm: number;
   timing: string;
   notes: string[];
+  live: boolean;
+  /** Live, and gives no pictures at the moment. */
+  silent: boolean;
+  /** Another one for each picture that is looked at. */
+  picture: number;
+}
+
+/** What is kept of a live source. */
+export interface KeptState {
+  folder: string;
+  frames: number;
+  seconds: number;
+  left_out: number;
+  over: boolean;
+  end: string;
 }
 
 export interface MapState {
@@ -51,6 +66,10 @@ export interface RunState {
   over: boolean;
   end: string;
   passed_over: number;
+  /** Frames of a live source in whose place a newer one was looked at. */
+  dropped: number;
+  /** From the stamp of its source until both pictures of the frame were there. */
+  waited_ms?: number;
   marks: [number, number, string][];
   tip_mm?: [number, number, number];
   times_ms?: {[stage: string]: number};

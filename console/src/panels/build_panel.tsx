@@ -41,7 +41,7 @@ function MapFigures({map}: {map: MapState}) {
       <dt>tetrahedra</dt><dd>{map.counts.elements}</dd>
       <dt>fixed nodes</dt><dd>{map.counts.fixed_nodes} of {map.counts.nodes}</dd>
       <dt>smallest angle</dt><dd>{map.smallest_dihedral_deg.toFixed(1)}°</dd>
-      <dt>from frame</dt><dd>{map.frame}</dd>
+      <dt>from frame</dt><dd>{map.frame < 0 ? 'live' : map.frame}</dd>
     </dl>
   );
 }

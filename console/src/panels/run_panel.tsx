@@ -1,8 +1,9 @@
 import {useEffect, useMemo, useRef, useState} from 'preact/hooks';
-import {useAsk, useLive, useNow} from '../model/hooks';
+import {isForSomethingElse, useAsk, useLive, useNow} from '../model/hooks';
 import {live} from '../model/live';
 import {ForceChart} from '../parts/force_chart';
 import {Gauge} from '../parts/gauge';
+import {Kept} from '../parts/kept';
 import {Lazy3d} from '../parts/lazy3d';
 import {age_ms, LivePicture} from '../parts/live_picture';
 import {wasLookedAt} from '../model/types';
@@ -17,8 +18,9 @@ function frameRate(): number {
 
 function Figures() {
   useNow(250);
-  const {run, roundTrip_ms} = live.state;
+  const {run, roundTrip_ms, source} = live.state;
   if (!run) return null;
+  const isLive = !!source?.live;
   const times = Object.entries(run.times_ms ?? {});
   const age = age_ms(live.drawn.at(-1) ?? 0);
   return (
@@ -30,12 +32,14 @@ function Figures() {
       </dd>
       <dt>shown</dt>
       <dd>{run.over ? '–' : `${frameRate().toFixed(0)} per s`}</dd>
-      <dt>passed over</dt>
-      <dd>{run.passed_over}</dd>
+      <dt>{isLive ? 'dropped' : 'passed over'}</dt>
+      <dd data-testid="dropped">{isLive ? run.dropped : run.passed_over}</dd>
       <dt>latency</dt>
-      <dd title="from both pictures decoded to the picture drawn here">
+      <dd title={isLive ? 'from the stamp of the source to the picture drawn here' : 'from both pictures decoded to the picture drawn here'}>
         {run.over || !Number.isFinite(age) ? '–' : `${(age + roundTrip_ms / 2).toFixed(0)} ms`}
       </dd>
+      {isLive && <dt>of it the source</dt>}
+      {isLive && <dd title="from the stamp until both pictures were looked at">{run.waited_ms !== undefined ? `${run.waited_ms.toFixed(0)} ms` : '–'}</dd>}
       <dt>of it the answer</dt>
       <dd title={times.map(([name, ms]) => `${name} ${ms.toFixed(1)} ms`).join(', ')}>
         {run.answer_ms !== undefined ? `${run.answer_ms.toFixed(0)} ms` : '–'}
@@ -51,7 +55,7 @@ export function RunPanel() {
   const [shows3d, setShows3d] = useState(false);
   const [markText, setMarkText] = useState('');
   const page = useRef<HTMLDivElement>(null);
-  const {run, rows, scene, map, phase} = state;
+  const {run, rows, scene, map, phase, source} = state;
   const isRunning = !!run && !run.over;
   const row = rows.findLast(wasLookedAt) ?? null;
   const peak = useMemo(() => rows.reduce((most, r) => Math.max(most, r.magnitude_N), 0), [rows]);
@@ -70,8 +74,7 @@ export function RunPanel() {
   };
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
-      const isWriting = event.target instanceof HTMLElement && event.target.matches('input:not([type=checkbox], [type=range], [type=radio]), select, textarea');
-      if (isWriting || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (isForSomethingElse(event)) return;
       const keys: {[key: string]: () => void} = {r: toggle, m: mark, z: rest, f: fullScreen};
       keys[event.key.toLowerCase()]?.();
     };
@@ -88,10 +91,14 @@ export function RunPanel() {
         <button class="primary" onClick={toggle} disabled={!isRunning && (phase === 'building' || !map || map.stale)}>
           {isRunning ? 'Stop' : 'Run and record'} <kbd>R</kbd>
         </button>
-        <label>
-          <input type="checkbox" checked={isRealtime} disabled={isRunning} onChange={(e) => setIsRealtime(e.currentTarget.checked)} />
-          at its own rate
-        </label>
+        {source?.live ? (
+          <Kept />
+        ) : (
+          <label>
+            <input type="checkbox" checked={isRealtime} disabled={isRunning} onChange={(e) => setIsRealtime(e.currentTarget.checked)} />
+            at its own rate
+          </label>
+        )}
         <span class="group">
           <input aria-label="text of the mark" placeholder="text of a mark" value={markText} onInput={(e) => setMarkText(e.currentTarget.value)} />
           <button onClick={mark} disabled={!run?.frame && run?.frame !== 0}>

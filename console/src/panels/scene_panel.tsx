@@ -166,7 +166,7 @@ export function ScenePanel() {
       <Said sentence={sentence} forget={forget} />
       <div class="picture">
         <Drawing
-          image={`/api/source/left.jpg?frame=${source.frame}&of=${encodeURIComponent(scene.file)}`}
+          image={`/api/source/left.jpg?picture=${source.picture}&of=${encodeURIComponent(scene.file)}`}
           width={source.width} height={source.height} outlines={outlinesOf(scene)} active={active} tool={tool} change={change}
         />
         <p class="hint">

@@ -3,6 +3,7 @@ import {useAsk, useKeys, useLive} from '../model/hooks';
 import {at, textOf} from '../model/scene_yaml';
 import type {SceneState, SourceState} from '../model/types';
 import {GroupForm} from '../parts/form';
+import {Kept} from '../parts/kept';
 import {Said} from '../parts/said';
 
 interface FileEntry {
@@ -59,6 +60,7 @@ function Browser() {
       <select value={choice[name]} onChange={(e) => setChoice({...choice, [name]: e.currentTarget.value})}>{options(kinds)}</select>
     </label>
   );
+  const mayOpenLive = useLive().mayOpenLive;
   const isWhole = !!choice.calibration && (choice.stereo ? true : !!choice.left && !!choice.right);
   const steps = folder ? folder.split('/') : [];
   return (
@@ -96,7 +98,39 @@ function Browser() {
         {select('calibration', ['yaml', 'calibration'])}
         <button class="primary" disabled={!isWhole || isBusy} onClick={() => void open('open_recording', choice.stereo ? {...choice, left: '', right: ''} : choice)}>Open recording</button>
       </fieldset>
+      <LiveForm mayOpen={mayOpenLive} isBusy={isBusy} calibration={choice.calibration} selectCalibration={select('calibration', ['yaml', 'calibration'])} open={(fields) => void open('open_recording', fields)} />
     </section>
+  );
+}
+
+interface LiveFormProps {
+  mayOpen: boolean;
+  isBusy: boolean;
+  calibration: string;
+  selectCalibration: preact.JSX.Element;
+  open: (fields: object) => void;
+}
+
+/** Cameras by device, address or GStreamer pipeline. */
+function LiveForm({mayOpen, isBusy, calibration, selectCalibration, open}: LiveFormProps) {
+  const [names, setNames] = useState({left: '', right: '', stereo: ''});
+  const field = (name: keyof typeof names, example: string) => (
+    <label>
+      {name}
+      <input aria-label={`live ${name}`} disabled={!mayOpen} placeholder={example} spellcheck={false} value={names[name]} onInput={(e) => setNames({...names, [name]: e.currentTarget.value})} />
+    </label>
+  );
+  const isWhole = !!calibration && (names.stereo ? true : !!names.left && !!names.right);
+  return (
+    <fieldset class="choice">
+      <legend>or a live source</legend>
+      {field('left', 'decklinkvideosrc device-number=0 ! deinterlace')}
+      {field('right', 'rtsp://192.168.1.20/right')}
+      {field('stereo', '0 (both side by side)')}
+      {selectCalibration}
+      <button class="primary" disabled={!mayOpen || !isWhole || isBusy} onClick={() => open({...(names.stereo ? {...names, left: '', right: ''} : names), calibration})}>Open live source</button>
+      {!mayOpen && <p class="hint">A pipeline can read and write anything on this computer, so the program has to be started with <code>--live</code> for it.</p>}
+    </fieldset>
   );
 }
 
@@ -144,13 +178,15 @@ function Pair({source, scene: {file: scene, values}}: {source: SourceState; scen
     <section class="pair">
       <h2>Rectified pair</h2>
       <div class="pair-picture">
-        <img alt="left and right image, rectified" src={`/api/source/pair.jpg?frame=${source.frame}&of=${encodeURIComponent(scene + source.timing + source.rectified_baseline_mm)}`} />
+        <img alt="left and right image, rectified" class={source.silent ? 'silent' : ''} src={`/api/source/pair.jpg?picture=${source.picture}&of=${encodeURIComponent(scene + source.timing + source.rectified_baseline_mm)}`} />
         <RowLines count={3} />
       </div>
-      <label class="slider">
+      {source.silent && <div class="banner" role="alert">The source gives no pictures; it is started again until it comes back.</div>}
+      {source.live && <Kept />}
+      {!source.live && <label class="slider">
         frame {frame}
         <input type="range" min="0" max={Math.max(0, source.frames - 1)} value={frame} onInput={(e) => setFrame(Number(e.currentTarget.value))} onChange={(e) => void ask('look', {frame: Number(e.currentTarget.value)})} />
-      </label>
+      </label>}
       {sentence && <p class="error" role="alert">{sentence}</p>}
       <p class="hint">The same place of the tissue must lie on the same line in both halves; drag a line to where there is much to see.</p>
       <dl class="figures wide">

@@ -25,6 +25,7 @@ export function LivePicture() {
       }
       to.getContext('2d')?.drawImage(picture.bitmap, 0, 0);
       to.dataset['frame'] = String(picture.frame);
+      to.dataset['age'] = age_ms(performance.now()).toFixed(1);
     };
     draw();
     return live.listen(draw);
