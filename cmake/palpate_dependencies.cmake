@@ -44,3 +44,12 @@ target_link_libraries(palpate_openigtlink INTERFACE ${OPENIGTLINK_LIBRARY})
 
 find_package(CycloneDDS REQUIRED)
 find_program(IDLC idlc REQUIRED)
+
+# Debian's own Python, unless Python_EXECUTABLE says otherwise.
+if(PALPATE_PYTHON)
+  if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
+    set(Python_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "Python that the module is for")
+  endif()
+  find_package(Python REQUIRED COMPONENTS Interpreter Development.Module)
+  find_package(pybind11 REQUIRED CONFIG)
+endif()

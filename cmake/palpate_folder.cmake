@@ -1,6 +1,10 @@
 # One folder = one idea = one static library. Headers stand beside sources and are included as "palpate/<folder>/<file>.h".
 #
 #   palpate_folder(stereo PUBLIC palpate_core PRIVATE TBB::tbb)
+#
+# What is below the streams goes into the shared library that is installed too (palpate_install.cmake).
+set(PALPATE_SHARED_FOLDERS core stereo surface volume elastic instrument observe contact infer estimate simulate feedback)
+
 # GCC 12 warns falsely inside std::string (-Wrestrict, GCC bug 105651) and the AVX-512 headers (GCC bug 105593).
 function(palpate_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi -Wno-restrict -Wno-maybe-uninitialized)
@@ -20,6 +24,10 @@ function(palpate_folder name)
   target_include_directories(palpate_${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(palpate_${name} PUBLIC ${F_PUBLIC} PRIVATE ${F_PRIVATE})
   target_compile_features(palpate_${name} PUBLIC cxx_std_20)
+  if(name IN_LIST PALPATE_SHARED_FOLDERS)
+    set_target_properties(palpate_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(palpate_${name} PRIVATE -fno-semantic-interposition)
+  endif()
   # Public, because Eigen aligns memory by it: whoever shares matrices with the library has to agree.
   if(PALPATE_NATIVE)
     target_compile_options(palpate_${name} PUBLIC -march=native)

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/settings_file.h"
 #include "palpate/core/source_kind.h"
 #include "palpate/core/yaml_tree.h"
 
@@ -533,21 +534,24 @@ void read_settings(const YAML::Node& node, const SettingsContext& context, Setti
   }
 }
 
-void read_settings_file(const std::filesystem::path& file, Settings& settings) {
+YAML::Node load_settings_file(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
   std::ostringstream content;
   content << std::ifstream(file, std::ios::binary).rdbuf();
   if (!is_text(content.str())) throw BadInput(fmt::format("{} is no text, expected a YAML scene file", file.string()));
-  YAML::Node root;
   try {
-    root = YAML::Load(content.str());
+    YAML::Node root = YAML::Load(content.str());
     require_tree(root);
+    return root;
   } catch (const YAML::Exception& error) {
     throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1, shown(error.msg)));
   }
-  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
-  read_settings(root, {file, folder}, settings);
+}
+
+void read_settings_file(const std::filesystem::path& file, Settings& settings) {
+  const YAML::Node root = load_settings_file(file);
+  read_settings(root, {file, std::filesystem::absolute(file).parent_path()}, settings);
 }
 
 std::string write_settings(const Settings& settings) {

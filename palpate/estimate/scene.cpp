@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/settings_file.h"
 
 namespace palpate {
 
@@ -127,7 +128,10 @@ Scene read_scene(const std::filesystem::path& file) {
                  [&scene](Settings& group) { describe(group, scene.recording); });
   settings.require("recording");
   describe(settings, scene);
-  read_settings_file(file, settings);
+  YAML::Node root = load_settings_file(file);
+  if (root.IsMap())
+    for (const char* key : {"overlay", "simulate", "streams", "run"}) root.remove(key);
+  read_settings(root, {file, std::filesystem::absolute(file).parent_path()}, settings);
   return scene;
 }
 
