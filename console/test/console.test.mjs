@@ -174,6 +174,18 @@ try {
     await shot('replay');
   });
 
+  await step('replays a run of the terminal, shapes too', async () => {
+    run('estimate', join(demo, 'scene.yaml'), '-o', join(root, 'by_terminal'), '--json');
+    await tab('Source');
+    await tab('Replay');
+    await page.getByLabel('run', {exact: true}).selectOption('by_terminal');
+    const rows = [...forcesOf(join(root, 'by_terminal/forces.csv')).values()];
+    await page.locator('.scrub input[max="109"]').fill('60');
+    await page.waitForFunction((text) => document.querySelector('[data-testid=force]').textContent === text, Number(rows[60].force_N).toFixed(2));
+    await page.locator(`.video img[alt="frame ${rows[60].frame}"]`).waitFor();
+    assert(!(await page.getByText('kept no shapes').isVisible()));
+  });
+
   await step('saves the scene, which the terminal and the page build again', async () => {
     await tab('Scene');
     await page.getByLabel('name of the scene file').fill('mine_scene.yaml');

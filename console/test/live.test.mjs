@@ -160,8 +160,10 @@ try {
       };
       look();
     }, [kBits, kSide_px, kX_px, kY_px]);
+    await page.getByRole('button', {name: 'Run and record'}).waitFor();
+    await page.waitForTimeout(200);
     await page.keyboard.press('r');
-    await page.getByRole('button', {name: 'Stop', exact: false}).first().waitFor();
+    await page.getByRole('button', {name: 'Stop'}).waitFor();
     await page.keyboard.press('v');
     await page.getByText('Stop the video').waitFor();
     await page.waitForTimeout(1000 * Math.min(5, seconds / 4));

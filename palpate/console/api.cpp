@@ -98,13 +98,14 @@ Answer files(const RootFolder& root, const std::string& folder) {
   return json_answer({{"folder", name == "." ? "" : name}, {"files", list}});
 }
 
+/// Not to be kept: pictures are numbered anew by each session, and those of a live source by their moment.
 Answer answer_source(const std::string& name, const Snapshot& s) {
   if (!s.source) return missing("no recording is open");
-  if (name == "left.jpg") return jpeg_answer(s.source->frame.left);
+  if (name == "left.jpg") return {200, "image/jpeg", jpeg_of(s.source->frame.left)};
   if (name == "pair.jpg" && !s.source->pair.left.empty()) {
     cv::Mat both;
     cv::hconcat(s.source->pair.left, s.source->pair.right, both);
-    return jpeg_answer(both);
+    return {200, "image/jpeg", jpeg_of(both)};
   }
   return missing("there is no such picture");
 }

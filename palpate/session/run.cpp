@@ -6,6 +6,7 @@
 #include "palpate/session/clear_results.h"
 #include "palpate/session/in_scene.h"
 #include "palpate/session/playback.h"
+#include "palpate/session/shape.h"
 #include "palpate/stream/stream_hub.h"
 
 namespace palpate {
@@ -49,13 +50,26 @@ struct Run::State {
     begin_results(folder);
     files.emplace(s, folder, built, *recording, std::move(truths), streams);
     files->losses.attempt([&] { write_map_files(built, folder); });
+    keep_shape([&] { shapes.emplace(folder / "shapes.bin", built); });
   }
 
   std::optional<RunFrame> next() {
     std::optional<PlayedFrame> played = playback.next();
     if (!played) return std::nullopt;
     last = played->frame;
-    return files->add(*played, answer_to(*played));
+    RunFrame shown = files->add(*played, answer_to(*played));
+    if (shapes) keep_shape([&] { shapes->write(shown.estimate); });
+    return shown;
+  }
+
+  /// Shapes are for looking at: a run goes on without.
+  template <class Work>
+  void keep_shape(const Work& work) {
+    try {
+      work();
+    } catch (const Unfinished&) {
+      shapes.reset();
+    }
   }
 
   ForceEstimate answer_to(const PlayedFrame& played) {
@@ -71,6 +85,7 @@ struct Run::State {
   std::shared_ptr<Recording> recording;
   Playback playback;
   std::optional<RunFiles> files;
+  std::optional<ShapeWriter> shapes;
   StereoFrame last;
   bool over = false;
 };

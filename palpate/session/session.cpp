@@ -18,7 +18,6 @@
 #include "palpate/session/run.h"
 #include "palpate/session/run_folder.h"
 #include "palpate/session/scene_text.h"
-#include "palpate/session/shape.h"
 #include "palpate/session/source_view.h"
 
 namespace palpate {
@@ -88,7 +87,6 @@ struct Session::State {
   std::vector<std::shared_ptr<const BuiltMap>> run_maps;  ///< outlive the run that was begun with them
   std::unique_ptr<Run> run;
   std::shared_ptr<RowLog> rows;
-  std::unique_ptr<ShapeWriter> shapes;  ///< nothing where the disk takes no more
   std::thread thread;
 
   State(RootFolder r, std::function<void()> c, bool may_open_live) : root(std::move(r)), on_change(std::move(c)) {
@@ -272,7 +270,6 @@ struct Session::State {
                                 RunControl{asked.realtime, [this] { return stop.load(); }},
                                 is_live() ? opened() : nullptr);
     view.frame_count = run->frame_count();
-    keep_shape([&] { shapes = std::make_unique<ShapeWriter>(view.folder / "shapes.bin", *now.map); });
     view.rows = rows = std::make_shared<RowLog>();
     now.run = std::move(view);
     now.phase = Phase::running;
@@ -337,16 +334,6 @@ struct Session::State {
     if (asked.done) asked.done(sentence);
   }
 
-  /// Shapes are for looking at: a run goes on without.
-  template <class Work>
-  void keep_shape(const Work& work) {
-    try {
-      work();
-    } catch (const Unfinished&) {
-      shapes.reset();
-    }
-  }
-
   void step_run() {
     std::optional<RunFrame> frame = run->next();
     now.run->dropped = run->dropped();
@@ -358,7 +345,6 @@ struct Session::State {
         ++now.run->passed_over;
         return publish();
       }
-      if (shapes) keep_shape([&] { shapes->write(estimate); });
       now.run->shown = std::make_shared<const RunFrame>(std::move(*frame));
       now.run->shown_ns = steady_ns();
       publish();
@@ -391,7 +377,6 @@ struct Session::State {
     now.run->over = true;
     now.run->end = run->files().losses.text();
     run.reset();
-    shapes.reset();
     run_maps.clear();
     now.phase = phase_at_rest();
   }

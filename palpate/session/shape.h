@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "palpate/estimate/force_estimate.h"
 #include "palpate/session/built_map.h"
-#include "palpate/session/run_files.h"
 
 namespace palpate {
 

@@ -194,7 +194,7 @@ TEST(Program, TheDemoMeetsItsGoals) {
   EXPECT_LE(figures["force_nrmse_pct"].get<double>(), 25);
   EXPECT_LE(std::abs(figures["onset_error_frames"].get<int>()), 5);
   EXPECT_LE(figures["tip_rmse_mm"].get<double>(), 2);
-  for (const char* name : {"forces.csv", "overlay.mp4", "map.vtu", "surface.ply", "report.html"})
+  for (const char* name : {"forces.csv", "overlay.mp4", "map.vtu", "surface.ply", "report.html", "shapes.bin"})
     EXPECT_TRUE(std::filesystem::exists(workspace / "demo" / name)) << name;
 }
 

@@ -118,7 +118,7 @@ export function ReplayPanel() {
       {hasShapes ? (
         <Lazy3d shape={shape} colouring="stress" tip_mm={row && row.status !== 'tool_lost' ? row.tip_mm : undefined} force_N={row?.in_contact ? row.force_N : undefined} />
       ) : (
-        <p class="hint">This run kept no shapes; runs of the console do.</p>
+        <p class="hint">This run kept no shapes.</p>
       )}
       <aside>
         <StatusLamp row={row} />
