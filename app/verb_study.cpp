@@ -6,86 +6,102 @@
 #include <nlohmann/json.hpp>
 
 #include "app/answer.h"
-#include "app/progress.h"
-#include "app/study_jobs.h"
-#include "app/study_page.h"
-#include "app/study_run.h"
+#include "app/run.h"
+#include "app/runtime.h"
+#include "app/simulation.h"
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
 #include "palpate/session/output_folder.h"
+#include "study/collect.h"
+#include "study/engines.h"
+#include "study/jobs.h"
+#include "study/work.h"
 
 namespace palpate::app {
 
 namespace {
 
-constexpr const char* kSequencePrefix = "sequence:";
+using study::Plan;
+using study::Study;
 
 struct Arguments {
   std::filesystem::path study, folder = "palpate_study";
-  std::string only, run;
+  std::string only, run, engine;
   bool quick = false, list_runs = false, collect = false, json = false;
   int jobs = 1;
 };
 
 /// Without what --only leaves out, and without sequences that nobody needs then. Copied, not erased in place: assigning
 /// to a YAML::Node changes every other that shares it.
-StudyPlan selected(const StudyPlan& plan, const std::string& pattern) {
+Plan selected(const Plan& plan, const std::string& pattern) {
   if (pattern.empty()) return plan;
-  StudyPlan chosen;
-  for (const StudyRun& run : plan.runs)
+  Plan chosen;
+  for (const study::Run& run : plan.runs)
     if (fnmatch(pattern.c_str(), run.name.c_str(), 0) == 0 ||
         fnmatch(pattern.c_str(), run.experiment->name.c_str(), 0) == 0)
       chosen.runs.push_back(run);
   if (chosen.runs.empty()) throw BadInput(fmt::format("--only {}: no run has such a name (see --list-runs)", pattern));
-  for (const StudySequence& sequence : plan.sequences)
+  for (const study::Sequence& sequence : plan.sequences)
     if (std::any_of(chosen.runs.begin(), chosen.runs.end(),
-                    [&sequence](const StudyRun& run) { return run.sequence == sequence.name; }))
+                    [&sequence](const study::Run& run) { return run.sequence == sequence.name; }))
       chosen.sequences.push_back(sequence);
   return chosen;
 }
 
-std::vector<std::string> command_of(const Arguments& arguments, const std::string& name) {
-  std::vector<std::string> words = {"study", arguments.study.string(), "-o", arguments.folder.string()};
+std::vector<std::string> command_of(const Arguments& arguments, const std::string& program) {
+  std::vector<std::string> words = {program, "study", arguments.study.string(), "-o", arguments.folder.string()};
   if (arguments.quick) words.emplace_back("--quick");
-  words.insert(words.end(), {"--run", name});
   return words;
 }
 
-void run_one(const Arguments& arguments, const Study& study, const StudyPlan& plan) {
-  for (const StudySequence& sequence : plan.sequences)
-    if (kSequencePrefix + sequence.name == arguments.run) return make_sequence(sequence, study, arguments.folder);
-  for (const StudyRun& run : plan.runs) {
+/// What it is from anywhere: jobs run in other folders.
+Arguments from_anywhere(Arguments arguments) {
+  arguments.study = std::filesystem::absolute(arguments.study);
+  arguments.folder = std::filesystem::absolute(arguments.folder);
+  return arguments;
+}
+
+void simulate(const std::filesystem::path& scene_file, const std::filesystem::path& folder) {
+  DejaVuSummary summary;
+  simulate_into(read_scene_file(scene_file, false), folder, true, summary);
+}
+
+nlohmann::ordered_json estimate(const std::filesystem::path& scene_file, const std::filesystem::path& folder,
+                                const std::filesystem::path& truth) {
+  return to_json(run_estimate(read_scene_file(scene_file, true), {folder, truth, true}));
+}
+
+void run_one(const Arguments& arguments, const Study& study, const Plan& plan) {
+  for (const study::Sequence& sequence : plan.sequences)
+    if ("sequence:" + sequence.name == arguments.run) return make_sequence(sequence, study, arguments.folder, simulate);
+  for (const study::Run& run : plan.runs) {
     if (run.name != arguments.run) continue;
-    for (const StudySequence& sequence : plan.sequences)
-      if (sequence.name == run.sequence) make_sequence(sequence, study, arguments.folder);
-    return make_run(run, arguments.folder);
+    for (const study::Sequence& sequence : plan.sequences)
+      if (sequence.name == run.sequence) make_sequence(sequence, study, arguments.folder, simulate);
+    return make_run(run, arguments.folder, estimate);
   }
   throw BadInput(fmt::format("--run {}: the study has no such run (see --list-runs)", arguments.run));
 }
 
-/// Sequences first, then the estimates; what is there already stays.
-void run_all(const Arguments& arguments, const StudyPlan& plan) {
-  const auto job = [&arguments](const std::string& name, const std::filesystem::path& log) {
-    return StudyJob{name, command_of(arguments, name), log};
-  };
-  std::vector<StudyJob> sequences, runs;
-  for (const StudySequence& sequence : plan.sequences)
-    if (!sequence_is_there(sequence, arguments.folder))
-      sequences.push_back(
-          job(kSequencePrefix + sequence.name, sequence_folder(sequence.name, arguments.folder) / "log.txt"));
-  for (const StudyRun& run : plan.runs)
-    if (const auto result = result_of(run, arguments.folder); result.is_null() || result["status"] == "skipped")
-      runs.push_back(job(run.name, run_folder(run, arguments.folder) / "log.txt"));
-  Progress progress("study", arguments.json);
-  const int total = static_cast<int>(sequences.size() + runs.size());
-  int done = 0;
-  const auto ended = [&](const StudyJob& ended_job, int exit_code) {
-    progress.show(++done, total, ended_job.name);
-    if (exit_code != kDone && !arguments.json)
-      fmt::print(stderr, "{}: exit code {}, see {}\n", ended_job.name, exit_code, ended_job.log.string());
-  };
-  run_jobs(sequences, arguments.jobs, ended);
-  run_jobs(runs, arguments.jobs, ended);
+/// What is there already stays.
+void run_all(const Arguments& arguments, const Plan& plan) {
+  const Arguments full = from_anywhere(arguments);
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  std::filesystem::create_directories(full.folder);
+  const auto jobs = jobs_left(jobs_of(plan, command_of(full, program)), plan, full.folder);
+  study::run_by_ninja(jobs, full.folder, full.jobs, full.json, [] { return interrupted().load(); });
+}
+
+/// Into the folder, for an engine on a cluster; nothing runs.
+void export_to(const Arguments& arguments, const Plan& plan) {
+  Arguments full = from_anywhere(arguments);
+  const std::filesystem::path to = full.folder;
+  full.folder = to / "results";
+  const auto jobs = jobs_of(plan, command_of(full, "palpate"));
+  std::vector<std::string> collect = command_of(full, "palpate");
+  collect.emplace_back("--collect");
+  if (!full.only.empty()) collect.insert(collect.end(), {"--only", full.only});
+  (full.engine == "slurm" ? study::export_slurm : study::export_snakemake)(jobs, collect, full.folder, to);
 }
 
 }  // namespace
@@ -103,6 +119,10 @@ void add_study(CLI::App& app) {
       ->type_name("PATTERN");
   verb->add_option("--jobs", arguments->jobs, "runs at once")->check(CLI::Range(1, 256))->capture_default_str();
   verb->add_flag("--list-runs", arguments->list_runs, "print each run's own command line, for a scheduler; do nothing");
+  verb->add_option("--export", arguments->engine,
+                   "write what a cluster runs the study by into the output folder; do nothing")
+      ->check(CLI::IsMember({"snakemake", "slurm"}))
+      ->type_name("ENGINE");
   verb->add_option("--run", arguments->run, "make this one only")->type_name("NAME");
   verb->add_flag("--collect", arguments->collect,
                  "only gather what is there into results.csv, report.html, results.md and figures");
@@ -111,21 +131,19 @@ void add_study(CLI::App& app) {
       "A study that was broken off goes on where it stopped.\n"
       "Example: palpate study studies/paper.yaml -o paper --quick && xdg-open paper/report.html");
   verb->callback([arguments] {
-    const Study study = read_study(arguments->study, arguments->quick);
-    const StudyPlan plan = selected(plan_of(study), arguments->only);
+    const Study study = study::read_study(arguments->study, arguments->quick);
+    const Plan plan = selected(plan_of(study), arguments->only);
     if (arguments->list_runs) {
-      const auto print = [&](const std::string& name) {
-        fmt::print("palpate {}\n", fmt::join(command_of(*arguments, name), " "));
-      };
-      for (const StudySequence& sequence : plan.sequences) print(kSequencePrefix + sequence.name);
-      for (const StudyRun& run : plan.runs) print(run.name);
+      for (const study::Job& job : jobs_of(plan, command_of(*arguments, "palpate")))
+        fmt::print("{}\n", study::shell_line(job.words));
       return;
     }
     require_output_folder(arguments->folder);
+    if (!arguments->engine.empty()) return export_to(*arguments, plan);
     if (!arguments->run.empty()) return run_one(*arguments, study, plan);
     if (!arguments->collect) run_all(*arguments, plan);
     std::filesystem::create_directories(arguments->folder);
-    const StudyCount count = collect_study(study, plan, arguments->folder);
+    const study::Count count = collect_study(study, plan, arguments->folder);
     if (!count.drew_charts && !arguments->json)
       fmt::print(stderr, "no charts in results.md: gnuplot is missing or failed\n");
     const std::string page = (arguments->folder / "report.html").string();

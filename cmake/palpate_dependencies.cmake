@@ -45,6 +45,13 @@ target_link_libraries(palpate_openigtlink INTERFACE ${OPENIGTLINK_LIBRARY})
 find_package(CycloneDDS REQUIRED)
 find_program(IDLC idlc REQUIRED)
 
+find_path(CMARK_INCLUDE cmark-gfm-core-extensions.h REQUIRED)
+find_library(CMARK_LIBRARY cmark-gfm REQUIRED)
+find_library(CMARK_EXTENSIONS_LIBRARY cmark-gfm-extensions REQUIRED)
+add_library(palpate_cmark INTERFACE)
+target_include_directories(palpate_cmark SYSTEM INTERFACE ${CMARK_INCLUDE})
+target_link_libraries(palpate_cmark INTERFACE ${CMARK_EXTENSIONS_LIBRARY} ${CMARK_LIBRARY})
+
 # Debian's own Python, unless Python_EXECUTABLE says otherwise.
 if(PALPATE_PYTHON)
   if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "app/study_file.h"
 #include "palpate/contact/contact_options.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/settings.h"
@@ -23,6 +22,7 @@
 #include "palpate/stereo/rig.h"
 #include "palpate/volume/attachments.h"
 #include "palpate/volume/polygon_soup.h"
+#include "study/plan.h"
 
 namespace palpate::fuzz {
 
@@ -88,7 +88,7 @@ std::optional<double> read_scene(std::string_view bytes) {
 
 std::optional<double> read_study_file(std::string_view bytes) {
   return unless_refused([&] {
-    const app::Study study = app::read_study(as_file("study.yaml", bytes), false);
+    const study::Study study = study::read_study(as_file("study.yaml", bytes), false);
     return static_cast<double>(study.title.size() + 1000 * study.experiments.size());
   });
 }

@@ -1,16 +1,16 @@
-#include "app/study_page.h"
+#include "study/collect.h"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
-#include "app/study_document.h"
-#include "app/study_figures.h"
-#include "app/study_page_parts.h"
-#include "app/study_results.h"
-#include "app/study_run.h"
+#include "study/document.h"
+#include "study/figures.h"
+#include "study/files.h"
+#include "study/page.h"
+#include "study/results.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
 
@@ -43,29 +43,15 @@ void write_table(const Json& page, const std::filesystem::path& file) {
   write_file(file, table);
 }
 
-/// What the page shows beside its charts: the overlay of an experiment of one run, the maps of real recordings.
-void embed_pictures(Json& page, const StudyPlan& plan, const std::filesystem::path& folder) {
-  for (Json& experiment : page["experiments"]) {
-    if (experiment["runs"].size() == 1)
-      for (const StudyRun& run : plan.runs)
-        if (run.experiment->name == experiment["name"])
-          experiment["clip"] = data_uri(run_folder(run, folder) / "overlay.mp4", "video/mp4");
-    for (Json& picture : experiment["pictures"])
-      if (experiment["key"] == "scene")
-        picture["data"] = data_uri(folder / picture["file"].get<std::string>(), "image/jpeg");
-  }
-}
-
 }  // namespace
 
-StudyCount collect_study(const Study& study, const StudyPlan& plan, const std::filesystem::path& folder) {
-  StudyCount count;
+Count collect_study(const Study& study, const Plan& plan, const std::filesystem::path& folder) {
+  Count count;
   Json page = gather_study(study, plan, folder);
   count.drew_charts = write_study_figures(page, plan, folder);
   write_table(page, folder / "results.csv");
-  write_file(folder / "results.md", study_document(page));
-  embed_pictures(page, plan, folder);
-  write_file(folder / "report.html", study_page_html(page));
+  write_file(folder / "results.md", study_document(page, false));
+  write_file(folder / "report.html", html_page(study_document(page, true), folder));
   for (const Json& experiment : page["experiments"])
     for (const Json& run : experiment["runs"]) {
       const Json& status = run["status"];
@@ -77,4 +63,4 @@ StudyCount collect_study(const Study& study, const StudyPlan& plan, const std::f
   return count;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

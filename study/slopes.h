@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate::app {
+namespace palpate::study {
 
 /// How an estimated force follows one setting: a straight line through all points, or, on a logarithmic axis, a power.
 struct Slope {
@@ -21,4 +21,4 @@ std::optional<Slope> slope_of(const std::vector<std::pair<double, double>>& poin
 /// logarithmic axis a factor. Forces are shares of the true one.
 double effect_of(const Slope& slope, double uncertainty, bool logarithmic);
 
-}  // namespace palpate::app
+}  // namespace palpate::study

@@ -1,4 +1,4 @@
-#include "app/study_file.h"
+#include "study/plan.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/yaml_tree.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
 
@@ -96,7 +96,7 @@ std::vector<double> range_of(const std::filesystem::path& file, const YAML::Node
   return values;
 }
 
-StudyValue number_value(double number) {
+Value number_value(double number) {
   YAML::Node node;
   // A whole number stays one: some keys are integers.
   if (number == std::round(number) && std::abs(number) < 1e9)
@@ -115,7 +115,7 @@ void reject_unknown(const std::filesystem::path& file, const YAML::Node& node, c
       fail(file, entry.first, fmt::format("unknown key {} in {}", key, where));
 }
 
-void read_sweep(const Study& study, const YAML::Node& sweep, const YAML::Node& base, StudyExperiment& experiment) {
+void read_sweep(const Study& study, const YAML::Node& sweep, const YAML::Node& base, Experiment& experiment) {
   const auto& file = study.file;
   reject_unknown(file, sweep, kSweepKeys, "a sweep");
   experiment.key = required(file, sweep, "key");
@@ -141,7 +141,7 @@ void read_sweep(const Study& study, const YAML::Node& sweep, const YAML::Node& b
       experiment.values.push_back(number_value(number));
   } else if (sweep["values"] && sweep["values"].IsSequence()) {
     for (const YAML::Node& item : sweep["values"]) {
-      StudyValue value;
+      Value value;
       value.value = item.IsMap() && item["value"] ? item["value"] : item;
       double number = 0;
       if (value.value.IsScalar() && YAML::convert<double>::decode(value.value, number)) value.number = number;
@@ -154,10 +154,10 @@ void read_sweep(const Study& study, const YAML::Node& sweep, const YAML::Node& b
   if (experiment.values.empty()) fail(file, sweep, "a sweep needs values, times or a range");
 }
 
-void keep_evenly(std::vector<StudyValue>& values, int count) {
+void keep_evenly(std::vector<Value>& values, int count) {
   const auto all = static_cast<int>(values.size());
   if (count >= all) return;
-  std::vector<StudyValue> kept;
+  std::vector<Value> kept;
   for (int i = 0; i < count; ++i)
     kept.push_back(values[static_cast<size_t>(count == 1 ? 0 : i * (all - 1) / (count - 1))]);
   // Not copied: assigning to a YAML::Node changes every other that shares it.
@@ -167,7 +167,7 @@ void keep_evenly(std::vector<StudyValue>& values, int count) {
 const std::set<std::string> kExperimentKeys = {"name", "title", "paper",    "says",  "why",   "scene",
                                                "set",  "sweep", "estimate", "goals", "quick", "expects_warning"};
 /// Several scenes, one run each.
-void read_scenes(const Study& study, const YAML::Node& scenes, StudyExperiment& experiment) {
+void read_scenes(const Study& study, const YAML::Node& scenes, Experiment& experiment) {
   experiment.key = "scene";
   for (const YAML::Node& scene : scenes) {
     const std::filesystem::path file = study.file.parent_path() / scene.as<std::string>();
@@ -177,11 +177,11 @@ void read_scenes(const Study& study, const YAML::Node& scenes, StudyExperiment& 
   if (experiment.values.empty()) fail(study.file, scenes, "scene names no file");
 }
 
-StudyExperiment read_experiment(const Study& study, const YAML::Node& node) {
+Experiment read_experiment(const Study& study, const YAML::Node& node) {
   const auto& file = study.file;
   if (!node.IsMap()) fail(file, node, "an experiment has keys: name, title, scene, ...");
   reject_unknown(file, node, kExperimentKeys, "an experiment");
-  StudyExperiment experiment;
+  Experiment experiment;
   experiment.name = required(file, node, "name");
   experiment.title = value_of(file, node, "title", experiment.name);
   experiment.paper = value_of<std::string>(file, node, "paper", "");
@@ -223,7 +223,7 @@ YAML::Node of_sequence(const YAML::Node& scene) {
   return kept;
 }
 
-void add_run(const Study& study, const StudyExperiment& experiment, const StudyValue* value, StudyPlan& plan) {
+void add_run(const Study& study, const Experiment& experiment, const Value* value, Plan& plan) {
   const bool is_scene = experiment.key == "scene";
   const std::filesystem::path file =
       is_scene ? study.file.parent_path() / value->value.as<std::string>() : experiment.scene;
@@ -244,12 +244,12 @@ void add_run(const Study& study, const StudyExperiment& experiment, const StudyV
     if (experiment.key.starts_with("simulate.")) scene = with_key(scene, experiment.key, value->value);
     tell(experiment.key, value->value);
   }
-  StudyRun run{experiment.name + "/" + (value ? as_folder(value->label) : "run"), &experiment, value, file, "", told};
+  Run run{experiment.name + "/" + (value ? as_folder(value->label) : "run"), &experiment, value, file, "", told};
   if (simulated) {
     const YAML::Node sequence = of_sequence(scene);
     run.sequence = file.stem().string() + "-" + fingerprint(YAML::Dump(sequence));
     if (std::none_of(plan.sequences.begin(), plan.sequences.end(),
-                     [&run](const StudySequence& known) { return known.name == run.sequence; }))
+                     [&run](const Sequence& known) { return known.name == run.sequence; }))
       plan.sequences.push_back({run.sequence, sequence});
   }
   plan.runs.push_back(run);
@@ -271,7 +271,7 @@ Study study_of(const std::filesystem::path& file, const YAML::Node& node, bool q
     fail(file, node, "experiments is missing (a list)");
   std::set<std::string> names;
   for (const YAML::Node& item : node["experiments"]) {
-    StudyExperiment experiment = read_experiment(study, item);
+    Experiment experiment = read_experiment(study, item);
     if (!names.insert(experiment.name).second)
       fail(file, item, fmt::format("two experiments have the name {}", experiment.name));
     if (quick && item["quick"]) {
@@ -295,13 +295,13 @@ Study read_study(const std::filesystem::path& file, bool quick) {
   }
 }
 
-StudyPlan plan_of(const Study& study) {
-  StudyPlan plan;
-  for (const StudyExperiment& experiment : study.experiments) {
+Plan plan_of(const Study& study) {
+  Plan plan;
+  for (const Experiment& experiment : study.experiments) {
     if (experiment.values.empty()) add_run(study, experiment, nullptr, plan);
-    for (const StudyValue& value : experiment.values) add_run(study, experiment, &value, plan);
+    for (const Value& value : experiment.values) add_run(study, experiment, &value, plan);
   }
   return plan;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

@@ -1,26 +1,17 @@
-#include "app/study_run.h"
+#include "study/work.h"
 
 #include <fmt/format.h>
 
 #include <cstdlib>
 #include <fstream>
 
-#include "app/run.h"
-#include "app/simulation.h"
 #include "palpate/core/errors.h"
 #include "palpate/feedback/sensor_log.h"
+#include "study/files.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
-
-constexpr const char* kDoneFile = "done";
-
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  if (!stream.flush()) throw Unfinished(file.string() + ": cannot be written");
-}
 
 /// Relative paths of a scene start at its file; a copy elsewhere has to say them in full.
 void make_paths_absolute(YAML::Node scene, const std::filesystem::path& from) {
@@ -75,11 +66,11 @@ nlohmann::ordered_json against_sensor(const std::filesystem::path& forces, const
 
 /// Figures and status of the estimate of `place`/scene.yaml, or why there are none.
 nlohmann::ordered_json estimated(const YAML::Node& scene, const std::filesystem::path& place,
-                                 const std::filesystem::path& truth) {
+                                 const std::filesystem::path& truth, const Estimate& estimate) {
   if (const std::string missing = missing_recording(scene); !missing.empty())
     return {{"status", "skipped"}, {"reason", missing}};
   try {
-    auto result = to_json(run_estimate(read_scene_file(place / "scene.yaml", true), {place, truth, true}));
+    auto result = estimate(place / "scene.yaml", place, truth);
     result["status"] = "done";
     if (const auto log = truth.parent_path() / "sensor.csv"; !truth.empty() && std::filesystem::exists(log))
       result["sensor"] = against_sensor(place / "forces.csv", log);
@@ -90,7 +81,7 @@ nlohmann::ordered_json estimated(const YAML::Node& scene, const std::filesystem:
 }
 
 /// What a run is told, to be recognised by.
-std::string told_text(const StudyRun& run) {
+std::string told_text(const Run& run) {
   return YAML::Dump(run.scene) + "\n# sequence " + run.sequence + "\n";
 }
 
@@ -100,15 +91,16 @@ std::filesystem::path sequence_folder(const std::string& sequence, const std::fi
   return folder / "sequences" / sequence;
 }
 
-std::filesystem::path run_folder(const StudyRun& run, const std::filesystem::path& folder) {
+std::filesystem::path run_folder(const Run& run, const std::filesystem::path& folder) {
   return folder / "runs" / run.name;
 }
 
-bool sequence_is_there(const StudySequence& sequence, const std::filesystem::path& folder) {
-  return std::filesystem::exists(sequence_folder(sequence.name, folder) / kDoneFile);
+bool sequence_is_there(const Sequence& sequence, const std::filesystem::path& folder) {
+  return std::filesystem::exists(sequence_folder(sequence.name, folder) / kSequenceDone);
 }
 
-void make_sequence(const StudySequence& sequence, const Study& study, const std::filesystem::path& folder) {
+void make_sequence(const Sequence& sequence, const Study& study, const std::filesystem::path& folder,
+                   const Simulate& simulate) {
   if (sequence_is_there(sequence, folder)) return;
   const std::filesystem::path place = sequence_folder(sequence.name, folder);
   std::filesystem::create_directories(place);
@@ -117,13 +109,12 @@ void make_sequence(const StudySequence& sequence, const Study& study, const std:
   if (body.IsMap() && body["shape"] &&
       std::filesystem::exists(study.file.parent_path() / body["shape"].as<std::string>()))
     body["shape"] = std::filesystem::absolute(study.file.parent_path() / body["shape"].as<std::string>()).string();
-  write_text(place / "simulate.yaml", YAML::Dump(scene) + "\n");
-  DejaVuSummary summary;
-  simulate_into(read_scene_file(place / "simulate.yaml", false), place, true, summary);
-  write_text(place / kDoneFile, "");
+  write_file(place / "simulate.yaml", YAML::Dump(scene) + "\n");
+  simulate(place / "simulate.yaml", place);
+  write_file(place / kSequenceDone, "");
 }
 
-void make_run(const StudyRun& run, const std::filesystem::path& folder) {
+void make_run(const Run& run, const std::filesystem::path& folder, const Estimate& estimate) {
   const std::filesystem::path place = run_folder(run, folder);
   std::filesystem::create_directories(place);
   YAML::Node scene = YAML::Clone(run.scene);
@@ -137,18 +128,18 @@ void make_run(const StudyRun& run, const std::filesystem::path& folder) {
     make_paths_absolute(scene, sequence);
     truth = sequence / "truth.csv";
   }
-  write_text(place / "scene.yaml", YAML::Dump(scene) + "\n");
-  nlohmann::ordered_json result = estimated(scene, place, truth);
+  write_file(place / "scene.yaml", YAML::Dump(scene) + "\n");
+  nlohmann::ordered_json result = estimated(scene, place, truth, estimate);
   result["told"] = told_text(run);
-  write_text(place / "result.json", result.dump(2) + "\n");
+  write_file(place / kRunResult, result.dump(2) + "\n");
 }
 
-nlohmann::ordered_json result_of(const StudyRun& run, const std::filesystem::path& folder) {
-  std::ifstream stream(run_folder(run, folder) / "result.json");
+nlohmann::ordered_json result_of(const Run& run, const std::filesystem::path& folder) {
+  std::ifstream stream(run_folder(run, folder) / kRunResult);
   if (!stream) return nullptr;
   auto result = nlohmann::ordered_json::parse(stream, nullptr, false);
   if (result.is_discarded() || result.value("told", "") != told_text(run)) return nullptr;
   return result;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

@@ -1,9 +1,9 @@
-#include "app/study_slopes.h"
+#include "study/slopes.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace palpate::app {
+namespace palpate::study {
 
 std::optional<Slope> slope_of(const std::vector<std::pair<double, double>>& points, bool logarithmic) {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
@@ -33,4 +33,4 @@ double effect_of(const Slope& slope, double uncertainty, bool logarithmic) {
   return logarithmic ? std::pow(uncertainty, slope.slope) - 1 : slope.slope * uncertainty;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

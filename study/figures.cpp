@@ -1,4 +1,4 @@
-#include "app/study_figures.h"
+#include "study/figures.h"
 
 #include <fmt/format.h>
 
@@ -11,12 +11,12 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "app/study_jobs.h"
-#include "app/study_page_parts.h"
-#include "app/study_results.h"
-#include "app/study_run.h"
+#include "study/engines.h"
+#include "study/files.h"
+#include "study/results.h"
+#include "study/work.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
 
@@ -264,7 +264,7 @@ bool write_picture(cv::Mat picture, const std::filesystem::path& file) {
 }
 
 /// The overlay at the greatest force; of a real recording, where no force is known, the map.
-void add_picture(const StudyRun& run, const Json& of_run, Json& pictures, const std::filesystem::path& folder) {
+void add_picture(const Run& run, const Json& of_run, Json& pictures, const std::filesystem::path& folder) {
   std::string name = run.name;
   std::replace(name.begin(), name.end(), '/', '_');
   const std::filesystem::path file = std::filesystem::path("figures") / (name + ".jpg");
@@ -288,7 +288,7 @@ void add_picture(const StudyRun& run, const Json& of_run, Json& pictures, const 
 
 }  // namespace
 
-bool write_study_figures(Json& page, const StudyPlan& plan, const std::filesystem::path& folder) {
+bool write_study_figures(Json& page, const Plan& plan, const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / "figures");
   std::vector<std::string> scripts = {"gnuplot"};
   for (Json& experiment : page["experiments"]) {
@@ -299,15 +299,18 @@ bool write_study_figures(Json& page, const StudyPlan& plan, const std::filesyste
       experiment["pictures"].push_back(
           {{"file", "figures/" + chart.name + ".svg"}, {"caption", chart.title.substr(0, chart.title.find('\n'))}});
     }
-    for (const StudyRun& run : plan.runs) {
+    for (const Run& run : plan.runs) {
       if (run.experiment->name != experiment["name"]) continue;
-      for (const Json& of_run : experiment["runs"])
-        if (of_run["name"] == run.name && of_run["status"] == "done" &&
-            (of_run["real"] || experiment["runs"].size() == 1))
-          add_picture(run, of_run, experiment["pictures"], folder);
+      for (const Json& of_run : experiment["runs"]) {
+        if (of_run["name"] != run.name || of_run["status"] != "done") continue;
+        const bool is_single = experiment["runs"].size() == 1;
+        if (of_run["real"] || is_single) add_picture(run, of_run, experiment["pictures"], folder);
+        if (is_single && std::filesystem::exists(run_folder(run, folder) / "overlay.mp4"))
+          experiment["clip"] = (run_folder(run, "") / "overlay.mp4").string();
+      }
     }
   }
-  const bool drew = scripts.size() == 1 || run_program(scripts, folder / "figures");
+  const bool drew = scripts.size() == 1 || run_program(scripts, folder / "figures") == 0;
   const auto is_there = [&folder](const Json& picture) {
     std::error_code none;
     const auto size = std::filesystem::file_size(folder / picture["file"].get<std::string>(), none);
@@ -322,4 +325,4 @@ bool write_study_figures(Json& page, const StudyPlan& plan, const std::filesyste
   return drew;
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

@@ -1,4 +1,4 @@
-#include "app/study_document.h"
+#include "study/document.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "app/study_results.h"
+#include "study/results.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
 
@@ -124,7 +124,7 @@ std::string sweep_table(const Json& experiment) {
   return table;
 }
 
-std::string section(const Json& experiment, const Json& columns) {
+std::string section(const Json& experiment, const Json& columns, bool with_clips) {
   std::string words = "## " + text(experiment["title"]) + "\n\n`" + text(experiment["name"]) + "`";
   if (!text(experiment["paper"]).empty()) words += " · paper: " + text(experiment["paper"]);
   words += "\n";
@@ -137,6 +137,7 @@ std::string section(const Json& experiment, const Json& columns) {
   if (!text(experiment["why"]).empty()) words += "\n**Why.** " + text(experiment["why"]) + "\n";
   for (const Json& picture : experiment["pictures"])
     words += fmt::format("\n![{}]({})\n", text(picture["caption"]), text(picture["file"]));
+  if (with_clips && experiment.contains("clip")) words += fmt::format("\n![Overlay]({})\n", text(experiment["clip"]));
   const Json& runs = experiment["runs"];
   const bool single = runs.size() == 1 && runs[0]["status"] == "done" && text(experiment["key"]).empty();
   return words + "\n" + (single ? goal_table(experiment, runs[0], columns) : sweep_table(experiment)) + "\n";
@@ -164,7 +165,7 @@ std::string ranking_table(const Json& ranking) {
 
 }  // namespace
 
-std::string study_document(const Json& page) {
+std::string study_document(const Json& page, bool with_clips) {
   int done = 0, all = 0;
   for (const Json& experiment : page["experiments"])
     for (const Json& run : experiment["runs"]) {
@@ -182,8 +183,8 @@ std::string study_document(const Json& page) {
         "## What matters most\n\nThe estimated force, when one setting is as wrong as it may well be and all else is "
         "known:\n\n" +
         ranking_table(page["ranking"]) + "\n";
-  for (const Json& experiment : page["experiments"]) words += section(experiment, page["columns"]);
+  for (const Json& experiment : page["experiments"]) words += section(experiment, page["columns"], with_clips);
   return words + "Research software, not a medical device. Forces are proportional to the stated modulus.\n";
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study

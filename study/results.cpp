@@ -1,4 +1,4 @@
-#include "app/study_results.h"
+#include "study/results.h"
 
 #include <fmt/format.h>
 
@@ -8,13 +8,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "app/study_run.h"
-#include "app/study_slopes.h"
 #include "palpate/core/errors.h"
 #include "palpate/feedback/forces_file.h"
 #include "palpate/feedback/sensor_log.h"
+#include "study/slopes.h"
+#include "study/work.h"
 
-namespace palpate::app {
+namespace palpate::study {
 
 namespace {
 
@@ -129,7 +129,7 @@ Json series_of(const std::filesystem::path& forces, const std::filesystem::path&
   return series;
 }
 
-Json run_json(const StudyRun& run, const std::filesystem::path& folder) {
+Json run_json(const Run& run, const std::filesystem::path& folder) {
   const Json result = result_of(run, folder);
   Json json;
   json["name"] = run.name;
@@ -159,7 +159,7 @@ Points over_setting(const Json& runs, const std::string& name) {
 }
 
 /// "-1.2 +- 0.3 % of the true force per mm".
-std::string slope_text(const StudyExperiment& experiment, const Slope& slope) {
+std::string slope_text(const Experiment& experiment, const Slope& slope) {
   if (experiment.logarithmic)
     return fmt::format("the force goes with it to the power {:.3f}", slope.slope) +
            (slope.error ? fmt::format(" ± {:.3f}", *slope.error) : "");
@@ -168,12 +168,12 @@ std::string slope_text(const StudyExperiment& experiment, const Slope& slope) {
          " % of the true force per " + unit;
 }
 
-std::string uncertainty_text(const StudyExperiment& experiment) {
+std::string uncertainty_text(const Experiment& experiment) {
   if (experiment.logarithmic) return fmt::format("a factor of {:g}", *experiment.uncertainty);
   return fmt::format("{:g} {}", *experiment.uncertainty, experiment.unit);
 }
 
-Json sensitivity_of(const StudyExperiment& experiment, const Json& runs) {
+Json sensitivity_of(const Experiment& experiment, const Json& runs) {
   const auto slope = slope_of(over_setting(runs, "gain"), experiment.logarithmic);
   if (!slope) return {};
   Json json = {{"slope", slope->slope}, {"at_zero", slope->at_zero}, {"text", slope_text(experiment, *slope)}};
@@ -186,7 +186,7 @@ Json sensitivity_of(const StudyExperiment& experiment, const Json& runs) {
 
 /// What named cases (attachments, say) make of the force against the first of them, without those that the program
 /// recognised by the warning that was expected.
-Json sensitivity_of_cases(const StudyExperiment& experiment, const Json& runs) {
+Json sensitivity_of_cases(const Experiment& experiment, const Json& runs) {
   if (runs.size() < 2 || !runs[0]["figures"]["gain"].is_number()) return {};
   const double first = runs[0]["figures"]["gain"];
   double largest = 0;
@@ -205,7 +205,7 @@ Json sensitivity_of_cases(const StudyExperiment& experiment, const Json& runs) {
 }
 
 /// What a sweep of numbers says in words.
-std::string findings_of(const StudyExperiment& experiment, const Json& runs, const Json& sensitivity) {
+std::string findings_of(const Experiment& experiment, const Json& runs, const Json& sensitivity) {
   std::string text;
   const std::string unit = experiment.unit.empty() ? "" : " " + experiment.unit;
   const Points errors = over_setting(runs, "force_nrmse_pct");
@@ -226,7 +226,7 @@ std::string findings_of(const StudyExperiment& experiment, const Json& runs, con
   return text;
 }
 
-Json experiment_json(const StudyExperiment& experiment, const StudyPlan& plan, const std::filesystem::path& folder) {
+Json experiment_json(const Experiment& experiment, const Plan& plan, const std::filesystem::path& folder) {
   Json json;
   json["name"] = experiment.name;
   json["title"] = experiment.title;
@@ -240,10 +240,10 @@ Json experiment_json(const StudyExperiment& experiment, const StudyPlan& plan, c
   json["goals"] = experiment.goals;
   json["expects_warning"] = experiment.expects_warning ? Json(*experiment.expects_warning) : Json();
   json["runs"] = Json::array();
-  for (const StudyRun& run : plan.runs)
+  for (const Run& run : plan.runs)
     if (run.experiment->name == experiment.name) json["runs"].push_back(run_json(run, folder));
   const bool numbers = std::any_of(experiment.values.begin(), experiment.values.end(),
-                                   [](const StudyValue& value) { return value.number.has_value(); });
+                                   [](const Value& value) { return value.number.has_value(); });
   json["sensitivity"] =
       numbers ? sensitivity_of(experiment, json["runs"]) : sensitivity_of_cases(experiment, json["runs"]);
   json["findings"] = findings_of(experiment, json["runs"], json["sensitivity"]);
@@ -270,15 +270,15 @@ Json ranking_of(const Json& experiments) {
 
 }  // namespace
 
-Json gather_study(const Study& study, const StudyPlan& plan, const std::filesystem::path& folder) {
+Json gather_study(const Study& study, const Plan& plan, const std::filesystem::path& folder) {
   Json page;
   page["title"] = study.title;
   page["about"] = study.about;
   for (const auto& [name, title] : kColumns) page["columns"].push_back({{"name", name}, {"title", title}});
   page["experiments"] = Json::array();
-  for (const StudyExperiment& experiment : study.experiments)
+  for (const Experiment& experiment : study.experiments)
     if (std::any_of(plan.runs.begin(), plan.runs.end(),
-                    [&experiment](const StudyRun& run) { return run.experiment->name == experiment.name; }))
+                    [&experiment](const Run& run) { return run.experiment->name == experiment.name; }))
       page["experiments"].push_back(experiment_json(experiment, plan, folder));
   page["ranking"] = ranking_of(page["experiments"]);
   return page;
@@ -296,4 +296,4 @@ std::string short_number(const Json& value) {
                        : fmt::format("{:.3g}", number);
 }
 
-}  // namespace palpate::app
+}  // namespace palpate::study
