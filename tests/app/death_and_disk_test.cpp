@@ -111,7 +111,7 @@ TEST_F(Estimate, ASecondRunIntoAFolderLeavesItsOwnFilesOnly) {
   const fs::path output = folder_ / "twice";
   fs::create_directories(output);
   for (const char* stale : {"forces.csv", "forces_2.csv", "overlay.mp4", "report.html", "run.yaml", "map.vtu",
-                            "surface.ply", "cloud.ply.part", "preview.png", "map.json", "notes.txt"})
+                            "surface.ply", "cloud.ply.part", "preview.png", "map.json", "shapes.bin", "notes.txt"})
     write_file(output / stale, "of an earlier run");
   ASSERT_EQ(run_palpate(command(output)).exit_code, 0);
   const std::string first = read_file(output / "forces.csv");
@@ -121,9 +121,9 @@ TEST_F(Estimate, ASecondRunIntoAFolderLeavesItsOwnFilesOnly) {
     names.insert(entry.path().filename().string());
     EXPECT_EQ(read_file(entry.path()) == "of an earlier run", entry.path().filename() == "notes.txt") << entry.path();
   }
-  EXPECT_EQ(names,
-            (std::set<std::string>{"forces.csv", "overlay.mp4", "report.html", "run.yaml", "map.vtu", "surface.ply",
-                                   "cloud.ply", "preview.png", "confidence.png", "map.json", "notes.txt"}));
+  EXPECT_EQ(names, (std::set<std::string>{"forces.csv", "overlay.mp4", "report.html", "run.yaml", "map.vtu",
+                                          "surface.ply", "cloud.ply", "preview.png", "confidence.png", "map.json",
+                                          "shapes.bin", "notes.txt"}));
   EXPECT_EQ(count_lines(output / "forces.csv"), kFrames + 1);
 }
 

@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 TEST(Belief, AMotionOfTheSceneIsUndone) {
-  const SceneMotion scene{{1, -2, 3}, {0.1, -0.2, 0.05}, {5, 5, 100}};
+  const SceneMotion scene{{1, -2, 3}, {0.1, -0.2, 0.05}, {5, 5, 100}, {0.02, -0.03, 0.01}};
   const Vec3 point(12, -7, 95);
   EXPECT_TRUE(scene.undo(scene.apply(point)).isApprox(point, 1e-12));
   EXPECT_TRUE(scene.apply(scene.about_mm).isApprox(scene.about_mm + scene.translation_mm, 1e-12));

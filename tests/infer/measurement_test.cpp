@@ -37,7 +37,7 @@ TEST(Measurement, TheDerivativesByTheScenesMotionAreThoseOfFiniteDifferences) {
   point.rest_mm = {12, -9, 95};
   const Vec3 about_mm(0, 0, 100);
   Eigen::VectorXd x0 = Eigen::VectorXd::Zero(Unknowns::kScene);
-  x0.head<6>() << 0.5, -1, 2, 0.001, -0.002, 0.0005;
+  x0.head<9>() << 0.5, -1, 2, 0.001, -0.002, 0.0005, 0.01, -0.02, 0.005;
   const auto residual = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
     return tissue_measurements({point}, {nullptr, nullptr, x, about_mm}, rig, parameters)[0].residual;
   };
