@@ -7,6 +7,8 @@
 
 namespace palpate {
 
+static_assert(Unknowns::kScene + kMostInstruments * Unknowns::kContact <= kMaxUnknowns);
+
 ForceFilter::ForceFilter(ContactModel model, const AttachedMesh& map, std::vector<TissuePoint> points,
                          const Rectification& rectification, const ContactOptions& contact,
                          const InferenceParameters& parameters)

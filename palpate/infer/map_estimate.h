@@ -9,8 +9,8 @@
 namespace palpate {
 
 /// Sizes are known to be small, so that nothing is allocated: a measured vector has at most 3 values, and there are at
-/// most so many unknowns.
-inline constexpr int kMaxValues = 3, kMaxUnknowns = 27;
+/// most those of two contacts.
+inline constexpr int kMaxValues = 3, kMaxUnknowns = Unknowns::kScene + 2 * Unknowns::kContact;
 
 /// One vector that was measured, to first order around a point x0 of the unknowns: z - h(x) = residual - H (x - x0).
 struct Measurement {
