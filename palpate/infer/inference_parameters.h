@@ -19,7 +19,7 @@ struct InferenceParameters {
   // What is not known beforehand: one standard deviation.
   double scene_mm = 15, scene_rad = 0.1;                 ///< rigid motion of the scene since the map
   double scene_walk_mm = 15, scene_walk_rad = 0.1;       ///< the same, per square root of a second
-  double scene_strain = 0.03, scene_walk_strain = 0.03;  ///< homogeneous strain of the scene, and its walk
+  double scene_strain = 0.01, scene_walk_strain = 0.003;  ///< homogeneous strain of the scene, and its walk
   double disparity_bias_px = 0.05;                       ///< common to all points of a frame
   double hand_mm_per_s = 40;                             ///< speed of a hand: walk of the patch, and of a free tip
   double log_radius = 0.7;                               ///< of the patch's radius: a factor of two
@@ -29,7 +29,7 @@ struct InferenceParameters {
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis
   double touch_mm = 0.1;                                ///< displacement of the patch in the frame of onset
-  double skew = 0.02;                                   ///< common error of the model's motion of all tissue, ratio
+  double skew = 0.03;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
 
