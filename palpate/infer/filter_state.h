@@ -55,6 +55,7 @@ struct FilterState {
   std::optional<SolvedBody> body;
   std::vector<PatchReach> patches;  ///< as believed before the frame
   std::optional<Renewal> renewal;   ///< left to `look_ahead`
+  bool has_looked_ahead = true;     ///< since the last frame
   std::future<void> ahead;          ///< the last one: nothing else may be touched until it has ended
 
   FilterState(ContactModel m, const AttachedMesh& map, std::vector<TissuePoint> p, const Rectification& r,

@@ -56,6 +56,7 @@ std::vector<TissuePoint> ForceFilter::wanted_points() {
 FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
   FilterState& s = *state_;
   s.finish_look_ahead();
+  s.has_looked_ahead = false;
   FrameAnswer answer;
   const double seconds = s.begun ? std::clamp(frame.time_s - s.last_time_s, 1e-3, 1.0) : 0.04;
   s.begun = true;

@@ -17,14 +17,14 @@ struct InferenceParameters {
   double excluded_radii = 1.2;     ///< points nearer to a patch than so many radii are left out
 
   // What is not known beforehand: one standard deviation.
-  double scene_mm = 15, scene_rad = 0.1;                 ///< rigid motion of the scene since the map
-  double scene_walk_mm = 15, scene_walk_rad = 0.1;       ///< the same, per square root of a second
+  double scene_mm = 15, scene_rad = 0.1;                  ///< rigid motion of the scene since the map
+  double scene_walk_mm = 15, scene_walk_rad = 0.1;        ///< the same, per square root of a second
   double scene_strain = 0.01, scene_walk_strain = 0.003;  ///< homogeneous strain of the scene, and its walk
-  double disparity_bias_px = 0.05;                       ///< common to all points of a frame
-  double hand_mm_per_s = 40;                             ///< speed of a hand: walk of the patch, and of a free tip
-  double log_radius = 0.7;                               ///< of the patch's radius: a factor of two
-  double stated_radius = 0.07;                           ///< the same where the stated one is right
-  double stated_right = 0.5;                             ///< probability that it is
+  double disparity_bias_px = 0.05;                        ///< common to all points of a frame
+  double hand_mm_per_s = 40;                              ///< speed of a hand: walk of the patch, and of a free tip
+  double log_radius = 0.7;                                ///< of the patch's radius: a factor of two
+  double stated_radius = 0.07;                            ///< the same where the stated one is right
+  double stated_right = 0.5;                              ///< probability that it is
   double tissue_radius = 0.12;  ///< of the log radius that the tissue tells: the model's error far from the patch
   double min_radius_ratio = 0.4, max_radius_ratio = 3;  ///< radii allowed, over the stated one
   double offset_mm = 0.4;                               ///< measured tip minus middle of the patch, each axis

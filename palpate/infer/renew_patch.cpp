@@ -55,6 +55,7 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Cont
 }
 
 void FilterState::look_ahead() {
+  has_looked_ahead = true;
   const bool is_current = renewal && renewal->prior.mean.size() == belief.mean.size();
   for (size_t i = 0; is_current && i < renewal->instruments.size(); ++i)
     renew_patch(renewal->instruments[i], renewal->prior, renewal->fit);
@@ -65,7 +66,7 @@ void FilterState::look_ahead() {
 void FilterState::finish_look_ahead() {
   if (ahead.valid()) {
     ahead.get();
-  } else {
+  } else if (!has_looked_ahead) {
     look_ahead();
   }
 }
