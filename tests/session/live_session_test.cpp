@@ -5,6 +5,7 @@
 #include <future>
 
 #include "palpate/session/session.h"
+#include "tests/session/session_test_base.h"
 #include "tests/support/live_cameras.h"
 #include "tests/support/plane_recording.h"
 
@@ -16,7 +17,7 @@ using test::read_file;
 using testing::HasSubstr;
 
 /// A session that may open live sources, and the plane, sent over loopback by another program.
-class ALiveSession : public testing::Test {
+class ALiveSession : public test::SessionTest {
  protected:
   void SetUp() override {
     if (!test::has_gstreamer()) GTEST_SKIP() << "gst-launch-1.0 or its plugins are missing";
@@ -31,30 +32,10 @@ class ALiveSession : public testing::Test {
     test::write_numbered(workspace_ / "cameras", "left", left);
     test::write_numbered(workspace_ / "cameras", "right", right);
     send();
-    session_ = std::make_unique<Session>(
-        RootFolder(workspace_ / "in"),
-        [this] {
-          const std::lock_guard lock(mutex_);
-          changed_.notify_all();
-        },
-        true);
+    begin(workspace_ / "in", true);
   }
 
   void send() { senders_ = std::make_unique<test::Senders>(workspace_ / "cameras", cameras_); }
-
-  /// What came of a command: empty = it was obeyed.
-  std::string ask(Command command) {
-    std::promise<std::string> told;
-    session_->ask(std::move(command), [&told](const std::string& sentence) { told.set_value(sentence); });
-    return told.get_future().get();
-  }
-
-  template <class Condition>
-  SharedSnapshot wait_for(const Condition& condition) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return condition(*session_->newest()); });
-    return session_->newest();
-  }
 
   void open() {
     ASSERT_EQ(ask(ask::OpenRecording{test::receiver(cameras_[0].port), test::receiver(cameras_[1].port), "",
@@ -69,9 +50,6 @@ class ALiveSession : public testing::Test {
   test::Workspace workspace_;
   std::vector<test::Sender> cameras_{{"left", test::free_port(), 0}, {"right", test::free_port(), 0}};
   std::unique_ptr<test::Senders> senders_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::unique_ptr<Session> session_;
 };
 
 TEST_F(ALiveSession, ShowsItsSourceAsItIsAndSaysWhereItIsSilent) {

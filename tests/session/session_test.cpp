@@ -9,6 +9,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/session/scene_text.h"
 #include "palpate/session/shape.h"
+#include "tests/session/session_test_base.h"
 #include "tests/support/plane_recording.h"
 
 namespace palpate {
@@ -20,36 +21,16 @@ using test::write_file;
 using testing::HasSubstr;
 
 /// A session below a folder that holds a recording with its scene.
-class ASession : public testing::Test {
+class ASession : public test::SessionTest {
  protected:
   ASession() {
     test::write_plane_recording(workspace_ / "in", 12);
-    session_ = std::make_unique<Session>(RootFolder(workspace_ / "in"), [this] {
-      const std::lock_guard lock(mutex_);
-      changed_.notify_all();
-    });
-  }
-
-  /// What came of a command: empty = it was obeyed.
-  std::string ask(Command command) {
-    std::promise<std::string> told;
-    session_->ask(std::move(command), [&told](const std::string& sentence) { told.set_value(sentence); });
-    return told.get_future().get();
-  }
-
-  template <class Condition>
-  SharedSnapshot wait_for(const Condition& condition) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return condition(*session_->newest()); });
-    return session_->newest();
+    begin(workspace_ / "in");
   }
 
   void open() { ASSERT_EQ(ask(ask::OpenScene{"scene.yaml"}), ""); }
 
   Workspace workspace_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::unique_ptr<Session> session_;
 };
 
 TEST_F(ASession, IsIdleUntilASceneIsOpenAndReadyThen) {
