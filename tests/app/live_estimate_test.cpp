@@ -112,7 +112,9 @@ TEST_F(LiveEstimate, GoesOnAfterItsSourceWasAway) {
   wait_for_row(away, [](const std::string& row) { return is_whole(row) && !is_lost(row); });
   EXPECT_EQ(interrupt(), 0);
   for (const ForceRow& row : read_forces(folder_ / "out/forces.csv"))
-    if (row.warnings.find("source_lost") != std::string::npos) EXPECT_EQ(row.status, "tool_lost");
+    if (row.warnings.find("source_lost") != std::string::npos) {
+      EXPECT_EQ(row.status, "tool_lost");
+    }
 }
 
 TEST_F(LiveEstimate, CheckSaysWhatTheLiveSourceShows) {
@@ -133,7 +135,9 @@ TEST(LivePage, EverySceneOnItIsOne) {
         text + "tissue: {preset: liver}\nattachments: [{underside: {depth_mm: 3}}]\n", "/tmp/scene.yaml");
     const RecordingOptions& recording = scene.scene.recording;
     for (const auto& source : {recording.left, recording.right, recording.stereo})
-      if (!source.empty()) EXPECT_NE(kind_of_source(source.string()), SourceKind::file) << source;
+      if (!source.empty()) {
+        EXPECT_NE(kind_of_source(source.string()), SourceKind::file) << source;
+      }
     ++scenes;
   }
   EXPECT_EQ(scenes, 4);
