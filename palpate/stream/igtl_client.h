@@ -11,8 +11,8 @@
 
 namespace palpate {
 
-enum class IgtlKind { status, tip, force, state, surface, overlay };
-inline constexpr size_t kIgtlKinds = 6;
+enum class IgtlKind { status, tip, force, state, tip_2, force_2, state_2, surface, overlay };
+inline constexpr size_t kIgtlKinds = 9;
 
 /// One client of the server: its socket and what waits for it. Never blocks.
 class IgtlClient {

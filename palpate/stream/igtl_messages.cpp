@@ -24,8 +24,12 @@ Vec3 to_ras(const Vec3& camera) {
   return {-camera.x(), -camera.y(), camera.z()};
 }
 
-IgtlBytes packed(igtl::MessageBase& message, const char* device, int64_t stamp_ns) {
-  message.SetDeviceName(device);
+std::string device_of(const char* name, int instrument) {
+  return instrument == 0 ? name : name + std::to_string(instrument + 1);
+}
+
+IgtlBytes packed(igtl::MessageBase& message, const std::string& device, int64_t stamp_ns) {
+  message.SetDeviceName(device.c_str());
   const igtl::TimeStamp::Pointer stamp = igtl::TimeStamp::New();
   stamp->SetTimeInNanoseconds(static_cast<igtlUint64>(std::max<int64_t>(0, stamp_ns)));
   igtl::TimeStamp::Pointer given = stamp;
@@ -66,24 +70,24 @@ int add_arrow(const ForceEstimate& estimate, igtl::PolyDataPointArray& points, i
 
 }  // namespace
 
-IgtlBytes igtl_tip(const StreamFrame& frame) {
+IgtlBytes igtl_tip(const StreamFrame& frame, int instrument) {
   const igtl::TransformMessage::Pointer message = igtl::TransformMessage::New();
   igtl::Matrix4x4 matrix;
   igtl::IdentityMatrix(matrix);
-  const Vec3 tip = to_ras(frame.estimate.tip_mm);
+  const Vec3 tip = to_ras(estimate_of(frame, instrument).tip_mm);
   for (int row = 0; row < 3; ++row) matrix[row][3] = static_cast<float>(tip[row]);
   message->SetMatrix(matrix);
-  return packed(*message, "PalpateTip", frame.wall_ns);
+  return packed(*message, device_of("PalpateTip", instrument), frame.wall_ns);
 }
 
-IgtlBytes igtl_state(const StreamFrame& frame, const StreamScene& scene) {
+IgtlBytes igtl_state(const StreamFrame& frame, const StreamScene& scene, int instrument) {
   const igtl::StringMessage::Pointer message = igtl::StringMessage::New();
-  std::string text = state_json(frame, scene.tissue);
+  std::string text = state_json(frame, scene.tissue, instrument);
   message->SetString(text);
-  return packed(*message, "PalpateState", frame.wall_ns);
+  return packed(*message, device_of("PalpateState", instrument), frame.wall_ns);
 }
 
-IgtlBytes igtl_force(const Vec3& force_N, bool valid, int64_t wall_ns) {
+IgtlBytes igtl_force(const Vec3& force_N, bool valid, int64_t wall_ns, int instrument) {
   const igtl::SensorMessage::Pointer message = igtl::SensorMessage::New();
   const igtl::Unit::Pointer newton = igtl::Unit::New();
   newton->Append(igtl::Unit::SI_DERIVED_NEWTON, 1);
@@ -92,7 +96,7 @@ IgtlBytes igtl_force(const Vec3& force_N, bool valid, int64_t wall_ns) {
   const Vec3 shown = valid ? to_ras(force_N) : Vec3::Zero().eval();
   for (int i = 0; i < 3; ++i) message->SetValue(static_cast<unsigned>(i), shown[i]);
   message->SetValue(3, valid ? 1 : 0);
-  return packed(*message, "PalpateForce", wall_ns);
+  return packed(*message, device_of("PalpateForce", instrument), wall_ns);
 }
 
 IgtlBytes igtl_surface(const StreamFrame* frame, const StreamScene& scene) {
@@ -117,8 +121,11 @@ IgtlBytes igtl_surface(const StreamFrame* frame, const StreamScene& scene) {
     }
     triangles->AddCell(3, corners);
   }
-  if (frame && has_force(frame->estimate) && frame->estimate.in_contact && frame->estimate.force_N.norm() > 0)
-    stress_kPa.resize(stress_kPa.size() + static_cast<size_t>(add_arrow(frame->estimate, *points, *lines, *triangles)));
+  for (int instrument = 0; frame && instrument < frame->instruments; ++instrument) {
+    const ForceEstimate& e = estimate_of(*frame, instrument);
+    if (has_force(e) && e.in_contact && e.force_N.norm() > 0)
+      stress_kPa.resize(stress_kPa.size() + static_cast<size_t>(add_arrow(e, *points, *lines, *triangles)));
+  }
   const igtl::PolyDataAttribute::Pointer stress = igtl::PolyDataAttribute::New();
   stress->SetType(igtl::PolyDataAttribute::POINT_SCALAR, 1);
   stress->SetName("von_mises_kPa");

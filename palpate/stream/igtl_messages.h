@@ -14,11 +14,13 @@ namespace palpate {
 /// declared LPS and sent as RAS: x and y change their sign.
 using IgtlBytes = std::shared_ptr<const std::vector<uint8_t>>;
 
-IgtlBytes igtl_tip(const StreamFrame& frame);                              ///< PalpateTip TRANSFORM
-IgtlBytes igtl_state(const StreamFrame& frame, const StreamScene& scene);  ///< PalpateState STRING
+/// PalpateTip TRANSFORM; that of the second instrument (1) is PalpateTip2, and so on for state and force.
+IgtlBytes igtl_tip(const StreamFrame& frame, int instrument = 0);
+/// PalpateState STRING.
+IgtlBytes igtl_state(const StreamFrame& frame, const StreamScene& scene, int instrument = 0);
 /// PalpateForce SENSOR: x, y, z in N (RAS) and 1 where they are valid, else four zeros.
-IgtlBytes igtl_force(const Vec3& force_N, bool valid, int64_t wall_ns);
-/// PalpateSurface POLYDATA: the body as it is deformed, and the force as an arrow that ends at the tip; von Mises
+IgtlBytes igtl_force(const Vec3& force_N, bool valid, int64_t wall_ns, int instrument = 0);
+/// PalpateSurface POLYDATA: the body as it is deformed, and each force as an arrow that ends at its tip; von Mises
 /// stress in kPa at each point. `frame` may be null: the body at rest.
 IgtlBytes igtl_surface(const StreamFrame* frame, const StreamScene& scene);
 /// PalpateOverlay IMAGE, RGB8: the picture upright, in the plane of the map's middle.

@@ -129,10 +129,18 @@ struct IgtlServer::State {
     if (has_tip(shown->estimate)) offer_to_all(IgtlKind::tip, igtl_tip(*shown), now_ns);
     offer_to_all(IgtlKind::state, igtl_state(*shown, scene), now_ns);
     if (!force) offer_to_all(IgtlKind::force, force_bytes(), now_ns);
+    if (shown->instruments > 1) offer_second(now_ns);
     if (was_ready != ready) offer_to_all(IgtlKind::status, status_bytes(), now_ns);
     if (surface.due(now_ns)) offer_to_all(IgtlKind::surface, igtl_surface(shown.get(), scene), now_ns);
     if (!shown->overlay.empty() && overlay.due(now_ns))
       offer_to_all(IgtlKind::overlay, igtl_overlay(*shown, scene), now_ns);
+  }
+
+  void offer_second(int64_t now_ns) {
+    const ForceEstimate& second = estimate_of(*shown, 1);
+    if (has_tip(second)) offer_to_all(IgtlKind::tip_2, igtl_tip(*shown, 1), now_ns);
+    offer_to_all(IgtlKind::state_2, igtl_state(*shown, scene, 1), now_ns);
+    offer_to_all(IgtlKind::force_2, igtl_force(second.force_N, has_force(second), shown->wall_ns, 1), now_ns);
   }
 
   void answer(IgtlClient& client, const IgtlReceived& message) {

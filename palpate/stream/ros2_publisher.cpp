@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <pthread.h>
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -60,10 +61,20 @@ geometry_msgs_msg_dds__Vector3_ to_vector(const Vec3& v) {
 
 }  // namespace
 
+namespace {
+
+/// What one instrument feels and where it is, and whether the last message of each was one to be used.
+struct Writers {
+  dds_entity_t force = 0, tip = 0;
+  bool force_sent = false, tip_sent = false;
+};
+
+}  // namespace
+
 struct Ros2Publisher::State {
   Ros2Options options;
-  dds_entity_t domain = 0, participant = 0, force = 0, tip = 0, overlay = 0;
-  bool force_sent = false, tip_sent = false;
+  dds_entity_t domain = 0, participant = 0, overlay = 0;
+  std::array<Writers, 2> instruments;
   int64_t next_overlay_ns = 0;
 
   std::mutex newest_mutex;  // held only to swap a pointer
@@ -86,8 +97,12 @@ struct Ros2Publisher::State {
                       options.interface, options.domain, reason));
     }
     try {
-      force = writer_of(participant, geometry_msgs_msg_dds__WrenchStamped__desc, options.prefix + "/measured_cf");
-      tip = writer_of(participant, geometry_msgs_msg_dds__PoseStamped__desc, options.prefix + "/measured_cp");
+      for (size_t i = 0; i < instruments.size(); ++i) {
+        const std::string& prefix = i == 0 ? options.prefix : options.prefix_2;
+        instruments[i].force =
+            writer_of(participant, geometry_msgs_msg_dds__WrenchStamped__desc, prefix + "/measured_cf");
+        instruments[i].tip = writer_of(participant, geometry_msgs_msg_dds__PoseStamped__desc, prefix + "/measured_cp");
+      }
       overlay = writer_of(participant, sensor_msgs_msg_dds__CompressedImage__desc, "palpate/overlay/compressed");
     } catch (const BadInput&) {
       close();
@@ -113,22 +128,25 @@ struct Ros2Publisher::State {
   }
 
   void send(const StreamFrame& frame) {
-    const ForceEstimate& e = frame.estimate;
+    for (int i = 0; i < frame.instruments; ++i) send(frame, estimate_of(frame, i), instruments[static_cast<size_t>(i)]);
+    if (!frame.overlay.empty() && options.overlay_hz > 0 && frame.decoded_ns >= next_overlay_ns) send_overlay(frame);
+  }
+
+  void send(const StreamFrame& frame, const ForceEstimate& e, Writers& writers) {
     const bool force_known = has_force(e), tip_known = has_tip(e);
-    if (const bool was_sent = std::exchange(force_sent, force_known); force_known || was_sent) {
+    if (const bool was_sent = std::exchange(writers.force_sent, force_known); force_known || was_sent) {
       geometry_msgs_msg_dds__WrenchStamped_ message{};
       message.header = header(force_known ? frame.wall_ns : 0);
       if (force_known) message.wrench.force = to_vector(e.force_N);
-      write(force, &message);
+      write(writers.force, &message);
     }
-    if (const bool was_sent = std::exchange(tip_sent, tip_known); tip_known || was_sent) {
+    if (const bool was_sent = std::exchange(writers.tip_sent, tip_known); tip_known || was_sent) {
       geometry_msgs_msg_dds__PoseStamped_ message{};
       message.header = header(tip_known ? frame.wall_ns : 0);
       message.pose.orientation.w = 1;
       if (tip_known) message.pose.position = {kMetres * e.tip_mm.x(), kMetres * e.tip_mm.y(), kMetres * e.tip_mm.z()};
-      write(tip, &message);
+      write(writers.tip, &message);
     }
-    if (!frame.overlay.empty() && options.overlay_hz > 0 && frame.decoded_ns >= next_overlay_ns) send_overlay(frame);
   }
 
   void send_overlay(const StreamFrame& frame) {

@@ -41,6 +41,10 @@ StreamScene stream_scene(const TissueMap& map, const StereoRig& rig, double fps,
   return scene;
 }
 
+const ForceEstimate& estimate_of(const StreamFrame& frame, int instrument) {
+  return instrument == 0 ? frame.estimate : frame.estimate.further.at(static_cast<size_t>(instrument) - 1);
+}
+
 bool has_force(const ForceEstimate& estimate) {
   return (estimate.status == FrameStatus::ok || estimate.status == FrameStatus::no_contact) &&
          estimate.force_N.allFinite();
@@ -50,8 +54,8 @@ bool has_tip(const ForceEstimate& estimate) {
   return estimate.status != FrameStatus::tool_lost && estimate.tip_mm.allFinite();
 }
 
-std::string state_json(const StreamFrame& frame, const TissueOptions& tissue) {
-  const ForceEstimate& e = frame.estimate;
+std::string state_json(const StreamFrame& frame, const TissueOptions& tissue, int instrument) {
+  const ForceEstimate& e = estimate_of(frame, instrument);
   nlohmann::ordered_json json;
   json["frame"] = e.frame;
   json["time_s"] = e.time_s;

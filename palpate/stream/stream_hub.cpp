@@ -17,6 +17,7 @@ struct StreamHub::State {
   std::unique_ptr<KinematicTrack> track;
   std::unique_ptr<IgtlServer> igtl;
   std::unique_ptr<Ros2Publisher> ros2;
+  int instruments = 1;
 };
 
 StreamHub::StreamHub(const StreamOptions& options, const StreamScene& scene, const InstrumentOptions& instrument)
@@ -67,6 +68,8 @@ void StreamHub::publish(const ForceEstimate& estimate, const cv::Mat& overlay, i
   if (!s.igtl && !s.ros2) return;
   auto frame = std::make_shared<StreamFrame>();
   frame->estimate = estimate;
+  if (!estimate.further.empty() && has_tip(estimate.further.front())) s.instruments = 2;
+  frame->instruments = estimate.further.empty() ? 1 : s.instruments;
   frame->overlay = overlay;
   frame->decoded_ns = decoded_ns;
   frame->wall_ns = wall_ns() - (steady_ns() - decoded_ns);

@@ -27,6 +27,7 @@ void describe(Settings& settings, Ros2Options& options) {
   settings.text("interface", options.interface,
                 "network address (or name, as eth0) that topics are sent on; 127.0.0.1: this machine only");
   settings.text("prefix", options.prefix, "before measured_cf and measured_cp");
+  settings.text("prefix_2", options.prefix_2, "the same of a second instrument");
   settings.text("camera_frame", options.camera_frame, "frame_id of the left camera's optical frame");
   settings.number("overlay_hz", options.overlay_hz, {0, 60},
                   "/palpate/overlay/compressed, at most so often; 0 = never");

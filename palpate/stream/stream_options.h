@@ -28,6 +28,7 @@ struct Ros2Options {
   int domain = 0;  ///< ROS_DOMAIN_ID
   std::string interface = "127.0.0.1";
   std::string prefix = "palpate/PSM1";       ///< of measured_cf and measured_cp
+  std::string prefix_2 = "palpate/PSM2";     ///< the same of a second instrument
   std::string camera_frame = "left_camera";  ///< frame_id
   double overlay_hz = 10;
 };

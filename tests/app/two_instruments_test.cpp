@@ -1,9 +1,18 @@
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <array>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "palpate/feedback/forces_file.h"
+#include "palpate/stream/address.h"
 #include "tests/app/program.h"
+#include "tests/support/live_cameras.h"
 
 namespace palpate::test {
 namespace {
@@ -34,8 +43,8 @@ void write_track(const std::filesystem::path& truth, const std::filesystem::path
   write_file(track, text);
 }
 
-TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
-  const Workspace workspace;
+/// A recording of both in `in`, with the tip of each as a robot would write it.
+void simulate_both(const Workspace& workspace) {
   write_file(workspace / "two.yaml", kScene);
   const Outcome made =
       run_palpate("simulate " + (workspace / "two.yaml").string() + " -o " + (workspace / "in").string());
@@ -44,6 +53,11 @@ TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
   write_track(workspace / "in/truth_2.csv", workspace / "in/tip_2.csv");
   replace_in_file(workspace / "in/scene.yaml", "instrument:\n",
                   "instrument:\n  track: tip.csv\n  track_2: tip_2.csv\n");
+}
+
+TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
+  const Workspace workspace;
+  ASSERT_NO_FATAL_FAILURE(simulate_both(workspace));
   const Outcome outcome =
       run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " + (workspace / "out").string() +
                   " --json --truth " + (workspace / "in/truth.csv").string());
@@ -72,6 +86,79 @@ TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
   // When the second lets go, the first one's force does not jump.
   for (size_t frame = 28; frame < 33; ++frame)
     EXPECT_LT((found[frame].force_N - truth[frame].force_N).norm(), 0.16 * truth[frame].force_N.norm()) << frame;
+}
+
+using Json = nlohmann::json;
+
+/// Reads an OpenIGTLink server (header version 1, by the published layout alone) until it goes; of each device that
+/// sends STRING, what it sent.
+class StringClient {
+ public:
+  explicit StringClient(int port) : thread_([this, port] { run(port); }) {}
+  std::map<std::string, std::vector<Json>> wait() {
+    thread_.join();
+    return received_;
+  }
+
+ private:
+  bool read(void* to, size_t size) const { return recv(socket_.get(), to, size, MSG_WAITALL) == ssize_t(size); }
+
+  void run(int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<uint16_t>(port));
+    for (int i = 0; i < 3000; ++i) {
+      socket_ = Descriptor(socket(AF_INET, SOCK_STREAM, 0));
+      if (connect(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) break;
+      usleep(10'000);
+    }
+    std::array<char, 58> header;
+    while (read(header.data(), header.size())) {
+      uint64_t size = 0;
+      for (size_t i = 42; i < 50; ++i) size = size << 8 | static_cast<uint8_t>(header[i]);
+      std::string body(size, '\0');
+      if (!read(body.data(), body.size())) return;
+      if (std::string(&header[2]) == "STRING") received_[&header[14]].push_back(Json::parse(body.substr(4)));
+    }
+  }
+
+  Descriptor socket_;
+  std::map<std::string, std::vector<Json>> received_;
+  std::thread thread_;
+};
+
+/// What was sent is what is written: as many digits as the file has.
+void expect_same(const std::vector<Json>& sent, const std::vector<ForceRow>& written) {
+  EXPECT_GE(sent.size(), written.size() / 4) << "newest wins, but most are seen";
+  int with_force = 0;
+  for (const Json& state : sent) {
+    const ForceRow& row = written.at(state["frame"].get<size_t>());
+    EXPECT_EQ(state["status"], row.status);
+    EXPECT_EQ(state["valid"], state.contains("force_N"));
+    if (!state.contains("force_N")) continue;
+    const auto force_N = state["force_N"].get<std::array<double, 3>>();
+    EXPECT_LT((Vec3(force_N[0], force_N[1], force_N[2]) - row.force_N).norm(), 1e-3) << row.frame;
+    if (row.force_magnitude_N > 0.1) ++with_force;
+  }
+  EXPECT_GE(with_force, 3);
+}
+
+TEST(TwoInstruments, AreStreamedAsTheyAreWritten) {
+  const Workspace workspace;
+  ASSERT_NO_FATAL_FAILURE(simulate_both(workspace));
+  const int port = free_port();
+  write_file(workspace / "in/scene.yaml", read_file(workspace / "in/scene.yaml") +
+                                              "streams:\n  openigtlink: {port: " + std::to_string(port) + "}\n");
+  StringClient client(port);
+  const Outcome outcome = run_palpate("estimate " + (workspace / "in/scene.yaml").string() + " -o " +
+                                      (workspace / "out").string() + " --realtime");
+  const auto sent = client.wait();
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+  ASSERT_TRUE(sent.contains("PalpateState") && sent.contains("PalpateState2"));
+  expect_same(sent.at("PalpateState"), read_forces(workspace / "out/forces.csv"));
+  expect_same(sent.at("PalpateState2"), read_forces(workspace / "out/forces_2.csv"));
+  EXPECT_THAT(outcome.output + outcome.error, testing::HasSubstr("OpenIGTLink: "));
 }
 
 }  // namespace

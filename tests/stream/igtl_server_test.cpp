@@ -158,6 +158,28 @@ TEST(IgtlServer, SendsEveryMessageInRas) {
   EXPECT_EQ(status->GetCode(), 1);
 }
 
+TEST(IgtlServer, SendsASecondInstrumentUnderNamesOfItsOwn) {
+  const OpenIgtLinkOptions options = test::on_free_port();
+  IgtlServer server(options, test::small_scene(), {}, {});
+  Client client(options.port);
+  const Frames frames(server, test::both_touching());
+  const auto tip = client.next<igtl::TransformMessage>("TRANSFORM", "PalpateTip2");
+  ASSERT_TRUE(tip.IsNotNull());
+  igtl::Matrix4x4 matrix;
+  tip->GetMatrix(matrix);
+  EXPECT_EQ(Vec3(matrix[0][3], matrix[1][3], matrix[2][3]), Vec3(5, 0, 80));
+  const auto state = client.next<igtl::StringMessage>("STRING", "PalpateState2");
+  ASSERT_TRUE(state.IsNotNull());
+  EXPECT_EQ(nlohmann::json::parse(state->GetString())["force_N"], (std::vector<double>{0, 0, -0.5}));
+  const auto force = client.next<igtl::SensorMessage>("SENSOR", "PalpateForce2");
+  ASSERT_TRUE(force.IsNotNull());
+  EXPECT_DOUBLE_EQ(force->GetValue(2), -0.5);
+  EXPECT_DOUBLE_EQ(force->GetValue(3), 1);
+  const auto surface = client.next<igtl::PolyDataMessage>("POLYDATA", "PalpateSurface");
+  ASSERT_TRUE(surface.IsNotNull());
+  EXPECT_EQ(surface->GetLines()->GetNumberOfCells(), 2U);
+}
+
 TEST(IgtlServer, SaysNotReadyAndSendsNoTipWhereNothingIsSeen) {
   const OpenIgtLinkOptions options = test::on_free_port();
   IgtlServer server(options, test::small_scene(), {}, {});

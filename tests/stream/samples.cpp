@@ -35,6 +35,14 @@ ForceEstimate touching(int frame) {
   return estimate;
 }
 
+ForceEstimate both_touching() {
+  ForceEstimate estimate = touching();
+  estimate.further = {touching()};
+  estimate.further[0].force_N = {0, 0, -0.5};
+  estimate.further[0].tip_mm = {-5, 0, 80};
+  return estimate;
+}
+
 ForceEstimate lost(int frame) {
   ForceEstimate estimate;
   estimate.frame = frame;
@@ -45,6 +53,7 @@ ForceEstimate lost(int frame) {
 std::shared_ptr<StreamFrame> frame_of(const ForceEstimate& estimate) {
   auto frame = std::make_shared<StreamFrame>();
   frame->estimate = estimate;
+  frame->instruments = 1 + static_cast<int>(estimate.further.size());
   frame->overlay = cv::Mat(54, 96, CV_8UC3, cv::Scalar(255, 0, 0));  // blue
   frame->decoded_ns = steady_ns();
   frame->wall_ns = wall_ns();

@@ -13,6 +13,8 @@ StreamScene small_scene();
 
 /// A frame in contact: force (0.1, -0.2, 0.3) N at the tip (10, 20, 90) mm.
 ForceEstimate touching(int frame = 7);
+/// The same, and a second instrument that pulls by (0, 0, -0.5) N at (-5, 0, 80) mm.
+ForceEstimate both_touching();
 /// A frame in which nothing is seen.
 ForceEstimate lost(int frame = 8);
 

@@ -118,6 +118,7 @@ int main(int argc, char** argv) {
   std::vector<Wanted> all;
   all.push_back({"rt/palpate/PSM1/measured_cf", "geometry_msgs::msg::dds_::WrenchStamped_", 6, Printer("wrench")});
   all.push_back({"rt/palpate/PSM1/measured_cp", "geometry_msgs::msg::dds_::PoseStamped_", 7, Printer("pose")});
+  all.push_back({"rt/palpate/PSM2/measured_cf", "geometry_msgs::msg::dds_::WrenchStamped_", 6, Printer("wrench_2")});
   all.push_back({"rt/palpate/overlay/compressed", "sensor_msgs::msg::dds_::CompressedImage_", 0, Printer("image")});
   for (Wanted& wanted : all) {
     fast::TypeSupport type(new Type(wanted.type, wanted.numbers));
