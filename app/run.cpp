@@ -19,14 +19,12 @@ namespace palpate::app {
 
 namespace {
 
-FrameTimes median_stages(const std::vector<FrameTimes>& times, const std::vector<ForceRow>& rows) {
-  const bool any_contact = std::any_of(rows.begin(), rows.end(), [](const ForceRow& row) { return row.in_contact; });
+FrameTimes median_stages(const std::vector<FrameTimes>& all) {
   FrameTimes medians;
   for (double FrameTimes::*stage : {&FrameTimes::rectify_ms, &FrameTimes::track_ms, &FrameTimes::contact_ms,
                                     &FrameTimes::solve_ms, &FrameTimes::stress_ms, &FrameTimes::draw_ms}) {
     std::vector<double> of_stage;
-    for (size_t i = 0; i < times.size(); ++i)
-      if (rows[i].in_contact || !any_contact) of_stage.push_back(times[i].*stage);
+    for (const FrameTimes& times : all) of_stage.push_back(times.*stage);
     medians.*stage = quantile(of_stage, 0.5);
   }
   return medians;
@@ -43,7 +41,7 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   for (const FrameTimes& times : files.times) frame_ms.push_back(times.total_ms());
   summary.median_frame_ms = quantile(frame_ms, 0.5);
   summary.p99_frame_ms = quantile(frame_ms, 0.99);
-  summary.stages = median_stages(files.times, files.rows);
+  summary.stages = median_stages(files.contact_times.empty() ? files.times : files.contact_times);
   for (const ForceRow& row : files.rows) {
     summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);
     ++summary.frames_by_status[row.status];

@@ -102,7 +102,8 @@ RunFrame RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   forces_2.write(estimate);
   pictures.offer(picture, estimate);
   rows.push_back(to_row(estimate));
-  times.push_back(estimate.times);
+  if (!played.passed_over) times.push_back(estimate.times);
+  if (estimate.in_contact) contact_times.push_back(estimate.times);
   return {std::move(estimate), picture, played.taken_ns, played.decoded_ns};
 }
 

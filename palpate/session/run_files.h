@@ -83,7 +83,8 @@ struct RunFiles {
   PictureChoice pictures;
   StreamHub& streams;
   std::vector<ForceRow> rows;
-  std::vector<FrameTimes> times;
+  std::vector<FrameTimes> times;          ///< of the frames that were looked at
+  std::vector<FrameTimes> contact_times;  ///< of those in contact
   int dropped = 0;  ///< frames of a live source that were not looked at; to be told before the end
 };
 
