@@ -114,7 +114,8 @@ std::vector<SurfacePiece> cut_surfaces(std::vector<PointCloud> groups, const Dep
     SurfacePiece piece;
     try {
       piece.clean = clean_points(groups[i], spacing_mm, options);
-      piece.surface = extend_rim(cocone(piece.clean.position_mm, options, &edges), groups[i].position_mm, spacing_mm);
+      piece.surface =
+          extend_rim(cocone(piece.clean.position_mm, options, &edges), groups[i].position_mm, spacing_mm, &edges);
     } catch (const BadInput& sentence) {
       // Too few points, or too narrow, for a surface at this spacing.
       if (why_none.empty()) why_none = sentence.what();

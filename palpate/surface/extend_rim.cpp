@@ -71,9 +71,25 @@ Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal
   return end_mm * outward + bend_mm * normal;
 }
 
+/// Takes the steps back that would draw a face over an edge: points beyond it may lie in the reach of the rim.
+void stay_before_edges(const Surface& surface, const DepthEdges& edges, std::map<int, Vec3>& step_of) {
+  const auto moved = [&](int i) -> Vec3 {
+    const auto step = step_of.find(i);
+    return step == step_of.end() ? at(surface.vertices_mm, i) : (at(surface.vertices_mm, i) + step->second).eval();
+  };
+  for (const Triangle& t : surface.triangles)
+    for (size_t k = 0; k < 3; ++k) {
+      const int a = t[k], b = t[(k + 1) % 3];
+      if (!step_of.count(a) && !step_of.count(b)) continue;
+      if (!is_torn(edges, moved(a), moved(b))) continue;
+      step_of.erase(a);
+      step_of.erase(b);
+    }
+}
+
 }  // namespace
 
-Surface extend_rim(Surface surface, const std::vector<Vec3>& measured_mm, double reach_mm) {
+Surface extend_rim(Surface surface, const std::vector<Vec3>& measured_mm, double reach_mm, const DepthEdges* edges) {
   const std::map<int, Vec3> outward = outward_directions(surface);
   const std::vector<std::pair<int, Vec3>> rim(outward.begin(), outward.end());
   const std::vector<Vec3> normals = vertex_normals(surface.vertices_mm, surface.triangles);
@@ -85,7 +101,10 @@ Surface extend_rim(Surface surface, const std::vector<Vec3>& measured_mm, double
     steps[i] =
         step_to_the_end(at(surface.vertices_mm, rim[i].first), tangent.normalized(), normal, measured_mm, reach_mm);
   });
-  for (size_t i = 0; i < rim.size(); ++i) surface.vertices_mm[static_cast<size_t>(rim[i].first)] += steps[i];
+  std::map<int, Vec3> step_of;
+  for (size_t i = 0; i < rim.size(); ++i) step_of[rim[i].first] = steps[i];
+  if (edges) stay_before_edges(surface, *edges, step_of);
+  for (const auto& [vertex, step] : step_of) surface.vertices_mm[static_cast<size_t>(vertex)] += step;
   return surface;
 }
 
