@@ -50,5 +50,14 @@ TEST(SafetyPage, HasATestForEveryHazard) {
   EXPECT_GT(rows, 20);
 }
 
+TEST(ContributingPage, NamesFilesThatExist) {
+  static const std::regex kNamed(R"(`((?:palpate|tests|bench|docs|app|fuzz|cmake|packaging)/[\w/.-]+)`)");
+  const std::string page = read_file(kSource / "CONTRIBUTING.md");
+  int named = 0;
+  for (std::sregex_iterator it(page.begin(), page.end(), kNamed), end; it != end; ++it, ++named)
+    EXPECT_TRUE(std::filesystem::exists(kSource / (*it)[1].str())) << "CONTRIBUTING.md names " << (*it)[1];
+  EXPECT_GT(named, 30);
+}
+
 }  // namespace
 }  // namespace palpate::test
