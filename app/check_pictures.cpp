@@ -29,14 +29,14 @@ cv::Mat shrunk(const cv::Mat& picture) {
 }
 
 /// One camera's picture with the outline of the mask, and axis and tip of each instrument.
-cv::Mat drawn(const cv::Mat& bgr, const cv::Mat& mask, const InstrumentObservations& seen, size_t eye) {
+cv::Mat drawn(const cv::Mat& bgr, const cv::Mat& mask, const InstrumentObservations& seen, size_t camera) {
   cv::Mat picture = bgr.clone();
   const int thick = std::max(1, bgr.cols / 320);
   std::vector<std::vector<cv::Point>> outlines;
   if (!mask.empty()) cv::findContours(mask, outlines, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
   cv::drawContours(picture, outlines, -1, kMaskColour, thick);
   for (size_t i = 0; i < seen.tips.size(); ++i) {
-    const std::optional<ImageTip>& tip = seen.tips[i].in_image[eye];
+    const std::optional<ImageTip>& tip = seen.tips[i].in_image[camera];
     if (!seen.tips[i].visible || !tip) continue;
     const cv::Scalar& colour = kTipColours[i % std::size(kTipColours)];
     cv::line(picture, tip->tip_px, tip->tip_px - 4 * tip->width_px * tip->axis, colour, thick, cv::LINE_AA);

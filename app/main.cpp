@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   app::add_modulus(program);
   app::add_study(program);
   app::add_console(program);
+  app::add_benchmark(program);
 
   try {
     program.parse(argc, argv);

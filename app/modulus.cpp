@@ -9,7 +9,7 @@
 
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
-#include "palpate/feedback/quantile.h"
+#include "palpate/core/quantile.h"
 #include "palpate/feedback/sensor_log.h"
 
 namespace palpate::app {
@@ -78,7 +78,7 @@ MeasuredModulus modulus_from_known_force(const std::vector<ForceRow>& estimated,
   if (ratios.empty())
     throw BadInput(fmt::format("--known-force names {:g} s, where the estimate has no contact; {}", known.time_s,
                                contact_times(estimated)));
-  return with_band(assumed_kPa * quantile(ratios, 0.5), quantile(half_widths, 0.5), ratios.size(),
+  return with_band(assumed_kPa * quantile_of(ratios, 0.5), quantile_of(half_widths, 0.5), ratios.size(),
                    fmt::format("{:g} N at {:g} s", known.force_N, known.time_s));
 }
 
@@ -96,7 +96,7 @@ MeasuredModulus modulus_from_sensor(const std::vector<ForceRow>& estimated, doub
     if (is_loaded(row) && row.force_magnitude_N > kLoadedRatio * peak_N) half_widths.push_back(log_half_width(row));
   // What one factor leaves of the difference is another error of the ratio, half of it at most in common.
   const double left = 0.5 * found.nrmse_scaled_pct / 100 * 1.96;
-  return with_band(assumed_kPa * found.scale, std::hypot(quantile(half_widths, 0.5), left), half_widths.size(),
+  return with_band(assumed_kPa * found.scale, std::hypot(quantile_of(half_widths, 0.5), left), half_widths.size(),
                    fmt::format("{}, clock {:+.3f} s, correlation {:.3f}", log.filename().string(), found.delay_s,
                                found.correlation));
 }

@@ -9,8 +9,8 @@
 #include "app/progress.h"
 #include "app/runtime.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/core/stopwatch.h"
-#include "palpate/feedback/quantile.h"
 #include "palpate/feedback/warnings.h"
 #include "palpate/session/output_folder.h"
 #include "palpate/session/run.h"
@@ -25,7 +25,7 @@ FrameTimes median_stages(const std::vector<FrameTimes>& all) {
                                     &FrameTimes::solve_ms, &FrameTimes::stress_ms, &FrameTimes::draw_ms}) {
     std::vector<double> of_stage;
     for (const FrameTimes& times : all) of_stage.push_back(times.*stage);
-    medians.*stage = quantile(of_stage, 0.5);
+    medians.*stage = quantile_of(of_stage, 0.5);
   }
   return medians;
 }
@@ -39,8 +39,8 @@ RunSummary summary_of(const RunFiles& files, double map_s) {
   summary.map_s = map_s;
   std::vector<double> frame_ms;
   for (const FrameTimes& times : files.times) frame_ms.push_back(times.total_ms());
-  summary.median_frame_ms = quantile(frame_ms, 0.5);
-  summary.p99_frame_ms = quantile(frame_ms, 0.99);
+  summary.median_frame_ms = quantile_of(frame_ms, 0.5);
+  summary.p99_frame_ms = quantile_of(frame_ms, 0.99);
   summary.stages = median_stages(files.contact_times.empty() ? files.times : files.contact_times);
   for (const ForceRow& row : files.rows) {
     summary.peak_force_N = std::max(summary.peak_force_N, row.force_magnitude_N);

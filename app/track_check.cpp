@@ -22,7 +22,7 @@ struct SeenTips {
   std::vector<SeenTip> tips;
   std::vector<int> frames;
 };
-using TipsOfAll = std::array<SeenTips, kMostInstruments>;
+using TipsOfAll = std::array<SeenTips, kMaxInstruments>;
 
 TipsOfAll tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
   InstrumentOptions from_images = scene.instrument;
@@ -36,7 +36,7 @@ TipsOfAll tips_in_video(const Scene& scene, const BuiltMap& built, bool quiet) {
   while (auto frame = recording.next()) {
     if (frame->left.empty() || frame->right.empty()) continue;
     const InstrumentObservations observed = tracker.update(rectify(rectification, *frame));
-    for (size_t i = 0; i < kMostInstruments; ++i) {
+    for (size_t i = 0; i < kMaxInstruments; ++i) {
       if (!observed.tips[i].visible) continue;
       seen[i].tips.push_back({frame->time_s, observed.tips[i].tip_mm});
       seen[i].frames.push_back(frame->index);

@@ -49,6 +49,14 @@ nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& buil
   return json;
 }
 
+/// What would go better, though nothing is wrong; empty where nothing is to be said.
+std::string advice_for(const Scene& scene) {
+  if (scene.contact.grip == Grip::push && scene.tissue.law == Law::saint_venant_kirchhoff)
+    return "tissue.law is saint-venant-kirchhoff, which loses its stiffness where tissue is pressed: for a push "
+           "saint-venant-kirchhoff-barrier is the same law and keeps it";
+  return {};
+}
+
 }  // namespace
 
 void add_check(CLI::App& app) {
@@ -80,6 +88,7 @@ void add_check(CLI::App& app) {
       nlohmann::ordered_json json = json_of(scene_file, built);
       if (!arguments->folder.empty()) json["folder"] = arguments->folder.string();
       if (track) json["track"] = to_json(*track);
+      if (const std::string advice = advice_for(scene_file.scene); !advice.empty()) json["advice"] = advice;
       fmt::print("{}", json_success(json));
       return;
     }
@@ -87,6 +96,7 @@ void add_check(CLI::App& app) {
                arguments->scene.string(), built.map.cloud.size(), 100 * built.map.report.coverage,
                built.map.mesh.tetrahedra.size(), built.map.fixed_nodes.size());
     if (track) fmt::print("{}", to_text(*track));
+    if (const std::string advice = advice_for(scene_file.scene); !advice.empty()) fmt::print("advice: {}\n", advice);
     if (!arguments->folder.empty()) fmt::print("written to {}\n", arguments->folder.string());
   });
 }

@@ -4,20 +4,11 @@
 #include <memory>
 
 #include "app/runtime.h"
+#include "app/share_folder.h"
 #include "app/verbs.h"
 #include "palpate/console/console_server.h"
 
 namespace palpate::app {
-
-namespace {
-
-/// Beside the program, wherever the two are moved: bin/palpate and share/palpate/console.
-std::filesystem::path page_folder() {
-  std::error_code error;
-  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share/palpate/console";
-}
-
-}  // namespace
 
 void add_console(CLI::App& app) {
   struct Arguments {
@@ -47,7 +38,7 @@ void add_console(CLI::App& app) {
     if (root.empty() && !arguments->scene.empty()) root = std::filesystem::absolute(arguments->scene).parent_path();
     ConsoleOptions options;
     options.port = arguments->port;
-    options.page = page_folder();
+    options.page = share_folder() / "console";
     options.may_open_live = arguments->live;
     options.asks_for_token = !arguments->bind.empty();
     if (options.asks_for_token) options.address = arguments->bind;

@@ -26,5 +26,6 @@ void add_check(CLI::App& app);
 void add_modulus(CLI::App& app);
 void add_study(CLI::App& app);
 void add_console(CLI::App& app);
+void add_benchmark(CLI::App& app);
 
 }  // namespace palpate::app

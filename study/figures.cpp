@@ -165,12 +165,12 @@ Points over(const Json& experiment, const std::string& name) {
 }
 
 bool is_wide(const Points& points) {
-  double least = INFINITY, most = 0;
+  double min = INFINITY, max = 0;
   for (const auto& [x, y] : points) {
-    least = std::min(least, y);
-    most = std::max(most, y);
+    min = std::min(min, y);
+    max = std::max(max, y);
   }
-  return least > 0 && most > kWideRange * least;
+  return min > 0 && max > kWideRange * min;
 }
 
 /// Error of the force, and how much too strong or too weak it is, over the swept setting.

@@ -80,12 +80,12 @@ std::optional<double> number_at(const YAML::Node& scene, const std::string& dott
   return YAML::convert<double>::decode(node, number) ? std::optional(number) : std::nullopt;
 }
 
-constexpr int kMostSteps = 1000;
+constexpr int kMaxSteps = 1000;
 
 std::vector<double> range_of(const std::filesystem::path& file, const YAML::Node& range, bool logarithmic) {
   const double from = value_of(file, range, "from", NAN), to = value_of(file, range, "to", NAN);
   const int steps = value_of(file, range, "steps", 0);
-  if (!std::isfinite(from) || !std::isfinite(to) || steps < 2 || steps > kMostSteps ||
+  if (!std::isfinite(from) || !std::isfinite(to) || steps < 2 || steps > kMaxSteps ||
       (logarithmic && (from <= 0 || to <= 0)))
     fail(file, range, "a range is {from: , to: , steps: 2 to 1000}, positive on a logarithmic axis");
   std::vector<double> values;

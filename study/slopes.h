@@ -18,7 +18,7 @@ struct Slope {
 std::optional<Slope> slope_of(const std::vector<std::pair<double, double>>& points, bool logarithmic);
 
 /// What an error of the setting makes of the force, relative: 0.05 = 5 % off. `uncertainty` in the setting's unit, on a
-/// logarithmic axis a factor. Forces are shares of the true one.
+/// logarithmic axis a factor. Forces are fractions of the true one.
 double effect_of(const Slope& slope, double uncertainty, bool logarithmic);
 
 }  // namespace palpate::study

@@ -60,7 +60,7 @@ struct Row {
     }
     return or_dash(found);
   }
-  int most(const std::function<int(const Measured&)>& figure) const {
+  int max(const std::function<int(const Measured&)>& figure) const {
     int found = 0;
     for (const Measured& m : measured) found = std::max(found, figure(m));
     return found;
@@ -100,9 +100,9 @@ void print_row(const std::string& name, const std::string& drive, const Goal& go
              name, drive, goal.text(), row.nrmse().median, row.nrmse().worst, second, row.median_gain(),
              row.direction_deg().median, row.worst([](const Measured& m) { return m.figures.onset_error_frames; }),
              row.worst([](const Measured& m) { return m.figures.release_error_frames; }),
-             row.most([](const Measured& m) { return m.figures.false_contact_frames; }),
-             row.most([](const Measured& m) { return m.figures.missed_force_frames; }),
-             row.most([](const Measured& m) { return m.figures.reversed_ok_frames; }), row.worst_between_pct(),
+             row.max([](const Measured& m) { return m.figures.false_contact_frames; }),
+             row.max([](const Measured& m) { return m.figures.missed_force_frames; }),
+             row.max([](const Measured& m) { return m.figures.reversed_ok_frames; }), row.worst_between_pct(),
              band_text(row),
              holds(goal, row, tip) ? "yes"
              : row.flagged()       ? "flagged"

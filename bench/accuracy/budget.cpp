@@ -69,7 +69,7 @@ std::string budget_row(const Case& c, const std::filesystem::path& folder) {
       tip_figures(read_forces(folder / c.name / "forces.csv"), truth, read_visible(c.sequence.truth));
   return fmt::format("| {} | {:.2f} / {:.2f} | {:.2f} | {:.3f} / {:.3f} | {:.1f} | {} | {} | {} | {} |\n", c.name,
                      tip.tip.lateral_mm, tip.tip.depth_mm, tip.worst_tip_mm, tip.since_onset.lateral_mm,
-                     tip.since_onset.depth_mm, 100 * tip.seen_right_share, nrmse(as_is),
+                     tip.since_onset.depth_mm, 100 * tip.seen_right_fraction, nrmse(as_is),
                      nrmse(measure(c.sequence, {true_tip}, folder / (c.name + "_true_tip"))), nrmse(with_volume),
                      nrmse(measure(c.sequence, both, folder / (c.name + "_true_both"))));
 }

@@ -7,6 +7,7 @@
 #include "app/runtime.h"
 #include "bench/accuracy/sequences.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/estimate/force_estimator.h"
 
 // Where the band of the force comes from: `bench_correlation [NAME ...]`, all static sequences without a name.
@@ -16,13 +17,6 @@ using namespace palpate;
 using namespace palpate::app;
 
 constexpr double kLoadedRatio = 0.05;  // of the peak: frames that count
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<ForceEstimate> loaded_frames(const SceneFile& file) {
   const BuiltMap built = build_map(file, true);
@@ -45,7 +39,7 @@ void print_row(const std::string& name, const std::vector<ForceEstimate>& frames
   const auto of = [&frames](double ForceCorrelation::*member) {
     std::vector<double> values;
     for (const ForceEstimate& e : frames) values.push_back(e.correlation.*member);
-    return median(values);
+    return median_of(values);
   };
   fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, frames.size(),
              of(&ForceCorrelation::scene_motion), of(&ForceCorrelation::disparity_bias), of(&ForceCorrelation::offset),

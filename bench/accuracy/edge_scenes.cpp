@@ -3,12 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "palpate/core/quantile.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/tissue_map.h"
+#include "palpate/feedback/map_confidence.h"
+#include "palpate/feedback/map_preview.h"
 #include "palpate/simulate/instrument_look.h"
 #include "palpate/simulate/organ_shape.h"
 #include "palpate/simulate/render.h"
@@ -183,14 +188,33 @@ bool bridges(const Surface& surface, const Triangle& t, const EdgeScene& scene) 
   return false;
 }
 
-double at_share(std::vector<double> values, double share) {
-  if (values.empty()) return NAN;
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+/// Name of the scene as a file: "loop_before_a_wall.jpg".
+std::string picture_name(const std::string& name) {
+  std::string file;
+  for (const char c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)))
+      file += c;
+    else if (c == ' ')
+      file += '_';
+  return file + ".jpg";
 }
 
-std::string edge_row(const EdgeScene& scene) {
+void write_picture(const std::filesystem::path& folder, const EdgeScene& scene, const Rectification& rectification,
+                   const TissueMap& map) {
+  const cv::Mat preview = draw_map_preview(scene.frame.left, rectification, map);
+  const cv::Mat mesh =
+                    preview({0, 0, std::min(preview.cols, scene.organ.cols), std::min(preview.rows, scene.organ.rows)}),
+                confidence = draw_map_confidence(scene.frame.left, rectification, map);
+  cv::Mat left, right, both;
+  const cv::Size size(640, 360);
+  cv::resize(mesh, left, size, 0, 0, cv::INTER_AREA);
+  cv::resize(confidence, right, size, 0, 0, cv::INTER_AREA);
+  cv::hconcat(left, right, both);
+  std::filesystem::create_directories(folder);
+  cv::imwrite((folder / picture_name(scene.name)).string(), both, {cv::IMWRITE_JPEG_QUALITY, 85});
+}
+
+std::string edge_row(const EdgeScene& scene, const std::filesystem::path& pictures) {
   const Rectification rectification = make_rectification(scene.rig, scene.organ.size());
   TissueOptions tissue;
   tissue.young_modulus_kPa = 20;
@@ -200,6 +224,7 @@ std::string edge_row(const EdgeScene& scene) {
   Stopwatch watch;
   const TissueMap map = build_tissue_map(scene.frame, rectification, options, tissue, attachments);
   const double time_ms = watch.lap_ms();
+  if (!pictures.empty()) write_picture(pictures, scene, rectification, map);
 
   cv::Mat1f away_px;
   cv::distanceTransform(drawn_rims(map, scene), away_px, cv::DIST_L2, cv::DIST_MASK_5);
@@ -215,7 +240,7 @@ std::string edge_row(const EdgeScene& scene) {
   for (int y = 0; y < scene.organ.rows; ++y)
     for (int x = 0; x < scene.organ.cols; ++x)
       if (scene.organ(y, x)) organ_depths_mm.push_back(static_cast<double>(scene.tissue_depth_mm(y, x)));
-  const double organ_depth_mm = at_share(organ_depths_mm, 0.5);
+  const double organ_depth_mm = quantile_of(organ_depths_mm, 0.5);
   const SurfacePiece& organ =
       *std::min_element(map.pieces.begin(), map.pieces.end(), [&](const SurfacePiece& a, const SurfacePiece& b) {
         return std::abs(a.depth_mm - organ_depth_mm) < std::abs(b.depth_mm - organ_depth_mm);
@@ -242,7 +267,7 @@ std::string edge_row(const EdgeScene& scene) {
     }
   return fmt::format(
       "| {} | {} | {:.2f} / {:.2f} | {:.0f} % | {} of {} | {:.2f} | {:.1f} % | {} | {:.0f} |\n", scene.name,
-      map.pieces.size(), at_share(cut_mm, 0.5), at_share(cut_mm, 0.95),
+      map.pieces.size(), quantile_of(cut_mm, 0.5), quantile_of(cut_mm, 0.95),
       100.0 * static_cast<double>(std::count_if(cut_mm.begin(), cut_mm.end(), [](double mm) { return mm <= 1; })) /
           static_cast<double>(std::max<size_t>(1, cut_mm.size())),
       across, faces, std::sqrt(squares / std::max(1, on)), 100.0 * off / std::max(1, on + off),
@@ -258,13 +283,13 @@ std::vector<EdgeScene> edge_scenes() {
   return scenes;
 }
 
-std::string edge_table() {
+std::string edge_table(const std::filesystem::path& pictures) {
   std::string table =
       "| scene | pieces | rim to true edge, median / 95 % mm | edge found within 1 mm | faces across a gap of 3 mm | "
       "S* "
       "to truth, RMS mm | S* more than 2 mm off | behind the instrument, RMS mm | Phi ms |\n"
       "|---|---|---|---|---|---|---|---|---|\n| goal | | <= 1 | | 0 | | | | <= 500 |\n";
-  for (const EdgeScene& scene : edge_scenes()) table += edge_row(scene);
+  for (const EdgeScene& scene : edge_scenes()) table += edge_row(scene, pictures);
   return table;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct EdgeScene {
 std::vector<EdgeScene> edge_scenes();
 
 /// One row for each: cut against the true edge, faces across gaps, surface and coverage, what is closed behind the
-/// instrument, time.
-std::string edge_table();
+/// instrument, time. Writes a picture of each map, mesh beside confidence, into `pictures` unless it is empty.
+std::string edge_table(const std::filesystem::path& pictures = {});
 
 }  // namespace palpate

@@ -57,7 +57,7 @@ TipFigures tip_figures(const std::vector<ForceRow>& estimate, const std::vector<
   }
   figures.tip = tips.rms();
   figures.since_onset = since_onset.rms();
-  if (!truth.empty()) figures.seen_right_share = static_cast<double>(right) / static_cast<double>(truth.size());
+  if (!truth.empty()) figures.seen_right_fraction = static_cast<double>(right) / static_cast<double>(truth.size());
   return figures;
 }
 

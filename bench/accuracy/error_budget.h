@@ -14,13 +14,13 @@ struct TipError {
 
 /// What the tip adds to the error of a force.
 struct TipFigures {
-  TipError tip;                 ///< in every frame with a tip
-  TipError since_onset;         ///< of the displacement since the first frame in contact, in contact
-  double worst_tip_mm = 0;      ///< of one frame
-  double seen_right_share = 0;  ///< frames in which a tip is reported exactly where the truth shows one
+  TipError tip;                    ///< in every frame with a tip
+  TipError since_onset;            ///< of the displacement since the first frame in contact, in contact
+  double worst_tip_mm = 0;         ///< of one frame
+  double seen_right_fraction = 0;  ///< frames in which a tip is reported exactly where the truth shows one
 };
 
-/// `visible`: by frame of the truth, whether both eyes see the tip. Frames are matched by number.
+/// `visible`: by frame of the truth, whether both cameras see the tip. Frames are matched by number.
 TipFigures tip_figures(const std::vector<ForceRow>& estimate, const std::vector<ForceRow>& truth,
                        const std::vector<bool>& visible);
 

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "bench/accuracy/instrument_pictures.h"
+#include "palpate/core/quantile.h"
 #include "palpate/instrument/instrument_finder.h"
 #include "palpate/instrument/way_choice.h"
 #include "palpate/stereo/recording.h"
@@ -36,12 +37,6 @@ struct Bench {
     return result;
   }
 };
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
-}
 
 double mean(const std::vector<double>& values) {
   double sum = 0;
@@ -116,11 +111,11 @@ void outlined(const Bench& bench) {
     row(bench, name + ": IoU, precision, recall", ">= .65, .9, .85",
         fmt::format("{:.2f}, {:.2f}, {:.2f}", mean(f.overlap), mean(f.precision), mean(f.recall)));
     row(bench, name + ": tips found; px median, 90 %", "90 %; 3, 8",
-        fmt::format("{} of {}; {:.1f}, {:.1f}", f.tip_px.size(), f.tips, quantile(f.tip_px, 0.5),
-                    quantile(f.tip_px, 0.9)));
+        fmt::format("{} of {}; {:.1f}, {:.1f}", f.tip_px.size(), f.tips, quantile_of(f.tip_px, 0.5),
+                    quantile_of(f.tip_px, 0.9)));
     row(bench, name + ": the same, of the outlines drawn by eye", "90 %; 3, 8",
-        fmt::format("{} of {}; {:.1f}, {:.1f}", f.tip_of_outline_px.size(), f.tips, quantile(f.tip_of_outline_px, 0.5),
-                    quantile(f.tip_of_outline_px, 0.9)));
+        fmt::format("{} of {}; {:.1f}, {:.1f}", f.tip_of_outline_px.size(), f.tips,
+                    quantile_of(f.tip_of_outline_px, 0.5), quantile_of(f.tip_of_outline_px, 0.9)));
   }
   if (!sets.empty()) row(bench, "all sets: IoU", ">= .80", fmt::format("{:.2f}", mean(overlaps)));
 }
@@ -168,7 +163,7 @@ void consecutive(const Bench& bench) {
     row(bench, fmt::format("{}, {} frames: lost, jumps, ms of one camera", video.name, video.frames.size()),
         "<= 5 %, 0",
         fmt::format("{:.0f} %, {}, {:.0f}", 100.0 * lost / static_cast<double>(video.frames.size()), jumps,
-                    quantile(milliseconds, 0.5)));
+                    quantile_of(milliseconds, 0.5)));
   }
 }
 
@@ -190,8 +185,8 @@ void clicked(const Bench& bench) {
   }
   if (pairs.empty()) return;
   row(bench, "thrust: found in both; tip px median; disparity px median", ">= 90 %; 3; 1.5",
-      fmt::format("{} of {}; {:.1f}; {:.1f}", tip_px.size(), pairs.size(), quantile(tip_px, 0.5),
-                  quantile(disparity_px, 0.5)));
+      fmt::format("{} of {}; {:.1f}; {:.1f}", tip_px.size(), pairs.size(), quantile_of(tip_px, 0.5),
+                  quantile_of(disparity_px, 0.5)));
 }
 
 /// Tip by frame out of truth.csv.
@@ -248,8 +243,8 @@ void with_truth(const Bench& bench) {
         ++lost;
     }
     row(bench, fmt::format("{}: tip mm median, 95 %; lost; ms mean, p99", name), "-; 25, 40",
-        fmt::format("{:.2f}, {:.2f}; {}; {:.0f}, {:.0f}", quantile(errors_mm, 0.5), quantile(errors_mm, 0.95), lost,
-                    mean(milliseconds), quantile(milliseconds, 0.99)));
+        fmt::format("{:.2f}, {:.2f}; {}; {:.0f}, {:.0f}", quantile_of(errors_mm, 0.5), quantile_of(errors_mm, 0.95),
+                    lost, mean(milliseconds), quantile_of(milliseconds, 0.99)));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <set>
 #include <sstream>
 
@@ -29,9 +30,9 @@ const std::string kBegin = "<!-- tables of bench_map -->\n", kEnd = "<!-- end of
 /// Middle of each triangle and the points half-way to its corners; at most a few thousand in all.
 template <class Wanted>
 std::vector<Vec3> samples_of(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, Wanted wanted) {
-  constexpr size_t kMostSamples = 4000;
+  constexpr size_t kMaxSamples = 4000;
   std::vector<Vec3> samples;
-  const size_t step = 4 * triangles.size() / kMostSamples + 1;
+  const size_t step = 4 * triangles.size() / kMaxSamples + 1;
   for (size_t i = 0; i < triangles.size(); i += step) {
     const Vec3 &a = vertices[static_cast<size_t>(triangles[i][0])], &b = vertices[static_cast<size_t>(triangles[i][1])],
                &c = vertices[static_cast<size_t>(triangles[i][2])];
@@ -164,7 +165,7 @@ void write_into(const std::filesystem::path& page, const std::string& tables) {
 int main(int argc, char** argv) {
   const std::string only = argc > 2 && std::string(argv[1]) == "--only" ? argv[2] : "";
   std::string tables;
-  const auto add = [&](const std::string& name, const std::string& title, std::string (*make)()) {
+  const auto add = [&](const std::string& name, const std::string& title, const std::function<std::string()>& make) {
     if (!only.empty() && only != name) return;
     const std::string text = fmt::format("**{}**\n\n{}\n", title, make());
     fmt::print("{}", text);
@@ -178,7 +179,10 @@ int main(int argc, char** argv) {
   add("times", "Surface: times", surface_time_table);
   add("volume", "Volume", volume_table);
   add("phi", "Whole Phi", phi_table);
-  add("edges", "Edges", edge_table);
+  add("edges", "Edges", [&] {
+    const std::filesystem::path page = argc == 2 ? argv[1] : "";
+    return edge_table(page.empty() ? page : page.parent_path() / "images/edges");
+  });
   if (argc == 2) write_into(argv[1], tables);
   return EXIT_SUCCESS;
 }

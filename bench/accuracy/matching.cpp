@@ -67,8 +67,8 @@ constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 DisparityMap by_sgbm(const TruthCase& c) {
   constexpr int kBlock = 5;
   const int first = cvFloor(c.rectification.disparity_px(c.options.farthest_mm));
-  const int most = cvCeil(c.rectification.disparity_px(c.options.nearest_mm));
-  const auto matcher = cv::StereoSGBM::create(first, (most - first + 16) / 16 * 16, kBlock, 8 * kBlock * kBlock,
+  const int max = cvCeil(c.rectification.disparity_px(c.options.nearest_mm));
+  const auto matcher = cv::StereoSGBM::create(first, (max - first + 16) / 16 * 16, kBlock, 8 * kBlock * kBlock,
                                               32 * kBlock * kBlock, 1, 31, 5, 100, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
   cv::Mat sixteenths;
   DisparityMap map;

@@ -11,8 +11,8 @@
 namespace palpate {
 namespace {
 
-constexpr double kLoadedShare = 0.05;  // of the true peak: frames that are judged
-constexpr double kFlaggedShare = 0.5;  // of them
+constexpr double kLoadedFraction = 0.05;  // of the true peak: frames that are judged
+constexpr double kFlaggedFraction = 0.5;  // of them
 
 /// Counts the frames with a force, and whether more than half of them are flagged.
 void judge_frames(const std::filesystem::path& forces, const std::filesystem::path& truth_file, Measured& measured) {
@@ -20,7 +20,7 @@ void judge_frames(const std::filesystem::path& forces, const std::filesystem::pa
   for (const ForceRow& row : read_forces(forces)) by_frame[row.frame] = row;
   int flagged = 0;
   for (const ForceRow& row : read_truth(truth_file)) {
-    if (!(row.force_magnitude_N > kLoadedShare * measured.figures.true_peak_N)) continue;
+    if (!(row.force_magnitude_N > kLoadedFraction * measured.figures.true_peak_N)) continue;
     ++measured.loaded_frames;
     const auto found = by_frame.find(row.frame);
     if (found == by_frame.end()) continue;
@@ -29,7 +29,7 @@ void judge_frames(const std::filesystem::path& forces, const std::filesystem::pa
         e.has_band() && e.force_low_N <= row.force_magnitude_N && row.force_magnitude_N <= e.force_high_N;
     flagged += e.status != "ok" || in_band;
   }
-  measured.flagged = flagged > kFlaggedShare * measured.loaded_frames;
+  measured.flagged = flagged > kFlaggedFraction * measured.loaded_frames;
 }
 
 }  // namespace

@@ -14,10 +14,10 @@ namespace {
 
 using namespace palpate;
 
-constexpr int kAttempts = 5;         // to draw a scene that can be made
-constexpr double kGoalPct = 10;      // of most scenes
-constexpr double kGoalShare = 0.95;  // of the scenes
-constexpr double kWorstPct = 20;     // of the others, unless flagged
+constexpr int kAttempts = 5;            // to draw a scene that can be made
+constexpr double kGoalPct = 10;         // of most scenes
+constexpr double kGoalFraction = 0.95;  // of the scenes
+constexpr double kWorstPct = 20;        // of the others, unless flagged
 
 Sequence rendered_scene(int number, const std::filesystem::path& folder) {
   const std::string name = fmt::format("{:02d}", number);
@@ -79,7 +79,7 @@ void print_summary(const std::vector<Scored>& all) {
   const auto worst =
       std::max_element(all.begin(), all.end(), [](const Scored& a, const Scored& b) { return nrmse(a) < nrmse(b); });
   fmt::print("\n{} of {} scenes at most {:g} % ({:.0f} %; goal {:.0f} %); median {:.1f} %\n", good, all.size(),
-             kGoalPct, 100.0 * static_cast<double>(good) / static_cast<double>(all.size()), 100 * kGoalShare,
+             kGoalPct, 100.0 * static_cast<double>(good) / static_cast<double>(all.size()), 100 * kGoalFraction,
              spread(errors).median);
   fmt::print("worst: scene {} with {:.1f} %{}; {} scenes above {:g} % and not flagged (goal 0)\n", worst->number,
              nrmse(*worst), worst->measured && worst->measured->flagged ? ", flagged" : "", bad, kWorstPct);

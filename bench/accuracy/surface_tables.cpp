@@ -81,7 +81,7 @@ Figures judge(const TrueSurface& truth, const View& view, const Surface& surface
 
 /// Turned over where most of it looks away from the camera: the peers do not know where the camera is.
 Surface towards_camera(Surface surface) {
-  if (share_facing_away(surface) > 0.5)
+  if (fraction_facing_away(surface) > 0.5)
     for (Triangle& t : surface.triangles) std::swap(t[1], t[2]);
   return surface;
 }

@@ -12,7 +12,7 @@ namespace {
 
 /// Edges under the footprint against those elsewhere, as a map refined at onset has them.
 constexpr double kEdgeRatio = 0.3;
-constexpr double kHeldShare = 0.3;
+constexpr double kHeldFraction = 0.3;
 
 HeldOrgan make_organ_of(int elements) {
   HeldOrgan organ;
@@ -23,7 +23,7 @@ HeldOrgan make_organ_of(int elements) {
                                          [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); });
   organ.touch_mm = *nearest;
   organ.mesh = tetrahedralize(body, elements, MeshFocus{*nearest, kFootprintRadius_mm, kEdgeRatio});
-  const double clamped_from_mm = farthest->z() - kHeldShare * (farthest->z() - nearest->z());
+  const double clamped_from_mm = farthest->z() - kHeldFraction * (farthest->z() - nearest->z());
   for (size_t n = 0; n < organ.mesh.nodes_mm.size(); ++n)
     if (organ.mesh.nodes_mm[n].z() > clamped_from_mm) organ.fixed_nodes.push_back(static_cast<int>(n));
   organ.boundary = boundary_triangles(organ.mesh);

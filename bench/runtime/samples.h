@@ -30,7 +30,9 @@ class Samples {
   }
 
  private:
-  double at(double share) const { return ms_[static_cast<size_t>(share * static_cast<double>(ms_.size() - 1) + 0.5)]; }
+  double at(double fraction) const {
+    return ms_[static_cast<size_t>(fraction * static_cast<double>(ms_.size() - 1) + 0.5)];
+  }
   std::vector<double> ms_;
 };
 

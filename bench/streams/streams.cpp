@@ -14,10 +14,10 @@
 #include "app/runtime.h"
 #include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/estimate/force_estimator.h"
 #include "palpate/feedback/forces_file.h"
 #include "palpate/feedback/overlay.h"
-#include "palpate/feedback/quantile.h"
 #include "palpate/stereo/recording.h"
 #include "palpate/stream/address.h"
 #include "palpate/stream/passive_force.h"
@@ -138,7 +138,7 @@ void print_jitter(const Recorded& r, double seconds, bool fifo) {
       "force loop, {}, {:.0f} s beside the estimator: {} answers, {} missed; late p50 {:.3f}, p99 {:.3f}, p99.9 "
       "{:.3f}, max {:.3f} ms; frame {:.1f} ms median\n",
       fifo ? "SCHED_FIFO" : "ordinary", f.seconds, f.loop.answers, f.loop.missed, f.loop.late_p50_ms,
-      f.loop.late_p99_ms, f.loop.late_p999_ms, f.loop.late_max_ms, quantile(f.frame_ms, 0.5));
+      f.loop.late_p99_ms, f.loop.late_p999_ms, f.loop.late_max_ms, quantile_of(f.frame_ms, 0.5));
 }
 
 void print_clients(const Recorded& r, double seconds) {
@@ -147,7 +147,7 @@ void print_clients(const Recorded& r, double seconds) {
   options.openigtlink.port = kPort;
   options.openigtlink.drop_after_s = 3600;  // the stuck ones stay
   const RunFigures alone = play(r, {}, seconds, false);
-  fmt::print("no stream: frame {:.2f} ms median\n", quantile(alone.frame_ms, 0.5));
+  fmt::print("no stream: frame {:.2f} ms median\n", quantile_of(alone.frame_ms, 0.5));
   for (const bool image : {false, true}) {
     options.openigtlink.overlay_hz = image ? 10 : 0;
     const RunFigures f = play(r, options, seconds, true);
@@ -155,7 +155,7 @@ void print_clients(const Recorded& r, double seconds) {
         "OpenIGTLink, {} clients of which {} never read, {} IMAGE: frame {:.2f} ms median; {} clients at the end; "
         "{:.0f} messages/s, {:.2f} MB/s; frame to wire {:.1f} ms median, {:.1f} for 99 %; {:.2f} ms of CPU per "
         "client and second\n",
-        kReading + kStuck, kStuck, image ? "with" : "without", quantile(f.frame_ms, 0.5), f.igtl.clients,
+        kReading + kStuck, kStuck, image ? "with" : "without", quantile_of(f.frame_ms, 0.5), f.igtl.clients,
         static_cast<double>(f.igtl.messages) / f.seconds, 1e-6 * static_cast<double>(f.igtl.bytes) / f.seconds,
         f.igtl.latency_p50_ms, f.igtl.latency_p99_ms, 1000 * f.igtl.cpu_s / f.seconds / (kReading + kStuck));
   }
@@ -207,8 +207,8 @@ void print_agreement(const Recorded& r, const std::filesystem::path& truth_file,
         "agreement with the full solve, {} tip, {:.0f} ms late: RMS {:.1f} %, median {:.1f} %, greatest {:.1f} % of "
         "the peak of {:.2f} N ({} frames)\n",
         kinematic ? "kinematic" : "predicted", 1000 * late_s,
-        100 * std::sqrt(squares / static_cast<double>(errors.size())), 100 * quantile(errors, 0.5),
-        100 * quantile(errors, 1), peak_N, errors.size());
+        100 * std::sqrt(squares / static_cast<double>(errors.size())), 100 * quantile_of(errors, 0.5),
+        100 * quantile_of(errors, 1), peak_N, errors.size());
   }
 }
 

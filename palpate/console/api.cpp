@@ -23,7 +23,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kThumbnailWidth_px = 240;
-constexpr size_t kMostFiles = 2000;
+constexpr size_t kMaxFiles = 2000;
 
 std::string text_of(const Query& query, const std::string& name) {
   const auto found = query.find(name);
@@ -92,7 +92,7 @@ Answer files(const RootFolder& root, const std::string& folder) {
     const std::string kind = kind_of(entry);
     if (kind.empty() || entry.path().filename().string().starts_with('.') || !root.holds(entry.path())) continue;
     list.push_back({{"name", entry.path().filename().string()}, {"file", root.name_of(entry.path())}, {"kind", kind}});
-    if (list.size() >= kMostFiles) break;
+    if (list.size() >= kMaxFiles) break;
   }
   const std::string name = root.name_of(inside);
   return json_answer({{"folder", name == "." ? "" : name}, {"files", list}});

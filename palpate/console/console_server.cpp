@@ -39,7 +39,7 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using tcp = asio::ip::tcp;
 
-constexpr size_t kMostViewers = 16, kMostConnections = 64, kMostWaiting = 32, kMostReplies = 64;
+constexpr size_t kMaxViewers = 16, kMaxConnections = 64, kMaxWaiting = 32, kMaxReplies = 64;
 constexpr size_t kLongestMessage = 256 * 1024;
 constexpr uint32_t kLongestHeader = 8 * 1024;
 /// What the kernel may keep for a viewer that does not read: else it would be shown pictures of the past.
@@ -220,7 +220,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   }
 
   void reply(std::string text) {
-    if (replies_.size() < kMostReplies) replies_.push_back(std::move(text));
+    if (replies_.size() < kMaxReplies) replies_.push_back(std::move(text));
     write_next();
   }
 
@@ -240,7 +240,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
     }
     if (message.ping) reply(pong_json(*message.ping));
     if (!message.command) return;
-    if (waiting_ >= kMostWaiting) return reply(reply_json(message.id, "too many commands wait already"));
+    if (waiting_ >= kMaxWaiting) return reply(reply_json(message.id, "too many commands wait already"));
     ++waiting_;
     hub_.session.ask(std::move(*message.command), [self = shared_from_this(), id = message.id](const std::string& why) {
       asio::post(self->hub_.io, [self, id, why] {
@@ -301,7 +301,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (const std::string why = refusal(hub_.access, caller); !why.empty())
       return write(response_to(request, {403, "text/plain; charset=utf-8", why + "\n"}));
     if (websocket::is_upgrade(request)) {
-      if (target.path != "/live" || hub_.viewers.size() >= kMostViewers)
+      if (target.path != "/live" || hub_.viewers.size() >= kMaxViewers)
         return write(response_to(request, {503, "text/plain; charset=utf-8", "no viewer more\n"}));
       stream_.expires_never();
       return std::make_shared<Viewer>(hub_, stream_.release_socket())->start(request);
@@ -403,7 +403,7 @@ struct ConsoleServer::State {
   void accept() {
     acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && hub.connections < kMostConnections) {
+      if (!error && hub.connections < kMaxConnections) {
         beast::error_code ignored;
         socket.set_option(tcp::no_delay(true), ignored);
         socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);

@@ -14,18 +14,17 @@ namespace {
 
 using nlohmann::json;
 
-constexpr size_t kMostChanges = 100;
-constexpr int kMostDeep = 12;
+constexpr size_t kMaxChanges = 100;
+constexpr int kMaxDeep = 12;
 
 json parse(const std::string& text) {
   int depth = 0;
   const auto not_too_deep = [&depth](int now, json::parse_event_t, json&) {
     depth = std::max(depth, now);
-    return now <= kMostDeep;
+    return now <= kMaxDeep;
   };
   json parsed = json::parse(text, not_too_deep, false);
-  if (parsed.is_discarded() || depth > kMostDeep || !parsed.is_object())
-    throw BadInput("the message is no JSON object");
+  if (parsed.is_discarded() || depth > kMaxDeep || !parsed.is_object()) throw BadInput("the message is no JSON object");
   return parsed;
 }
 
@@ -47,7 +46,7 @@ std::string text(const json& message, const char* name) {
 ask::Edit edit_of(const json& message) {
   ask::Edit edit;
   const auto changes = message.find("changes");
-  if (changes == message.end() || !changes->is_array() || changes->size() > kMostChanges)
+  if (changes == message.end() || !changes->is_array() || changes->size() > kMaxChanges)
     throw BadInput("an edit needs changes: [{path: [...], value: ...}, ...]");
   for (const json& change : *changes) {
     if (!change.is_object()) throw BadInput("a change needs path and value");

@@ -21,7 +21,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kDeepest = 4;
-constexpr size_t kMostRuns = 500;
+constexpr size_t kMaxRuns = 500;
 /// A jump further ahead than this is quicker than reading on.
 constexpr int kReadOn_frames = 60;
 
@@ -63,7 +63,7 @@ Answer list_runs(const RootFolder& root) {
       continue;
     const auto written = std::filesystem::last_write_time(at->path()).time_since_epoch().count();
     runs.push_back({{"folder", root.name_of(at->path().parent_path())}, {"written", written}});
-    if (runs.size() >= kMostRuns) break;
+    if (runs.size() >= kMaxRuns) break;
   }
   std::sort(runs.begin(), runs.end(),
             [](const ordered_json& a, const ordered_json& b) { return a["written"] > b["written"]; });

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr size_t kMostRows = 500;
+constexpr size_t kMaxRows = 500;
 
 /// What the file says, scalars as they are written.
 ordered_json tree_of(const YAML::Node& node) {
@@ -137,7 +137,7 @@ std::string state_json(const Snapshot& s, const RootFolder& root, ToldSoFar& tol
   if (log) {
     json["rows_from"] = told.rows;
     json["rows"] = ordered_json::array();
-    for (const ForceRow& row : log->from(told.rows, kMostRows)) json["rows"].push_back(row_json(row));
+    for (const ForceRow& row : log->from(told.rows, kMaxRows)) json["rows"].push_back(row_json(row));
     told.rows += json["rows"].size();
     has_more = told.rows < log->size();
   }

@@ -9,7 +9,7 @@ namespace palpate {
 namespace {
 
 /// Conjugate gradients end after so many steps.
-constexpr int kMostGradients = 40;
+constexpr int kMaxGradients = 40;
 /// Steps on one factor that have cost more than a new one.
 constexpr int kStaleGradients = 80;
 /// What a new tangent costs, in solves.
@@ -81,7 +81,7 @@ NewtonStep BorderedSystem::solve(const Eigen::VectorXd& f_int, const Eigen::Vect
 }
 
 NewtonStep BorderedSystem::solve_at(const TetModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& f_int,
-                                    const Eigen::VectorXd& g, double share, int& solves) {
+                                    const Eigen::VectorXd& g, double fraction, int& solves) {
   model.tangent(u, false, K_);
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(J_.rows());
   const bool constrained = g.isZero(0);
@@ -94,9 +94,9 @@ NewtonStep BorderedSystem::solve_at(const TetModel& model, const Eigen::VectorXd
   Eigen::VectorXd along = step.du;
   step.du = du;
   double slope = -residual.dot(along);
-  const double enough = share * share * slope;
+  const double enough = fraction * fraction * slope;
   int gradients = constrained ? 1 : 2;
-  for (; gradients < kMostGradients && slope > enough; ++gradients) {
+  for (; gradients < kMaxGradients && slope > enough; ++gradients) {
     const Eigen::VectorXd K_along = K_.selfadjointView<Eigen::Lower>() * along;
     const double curvature = along.dot(K_along);
     if (curvature <= 0) {

@@ -44,10 +44,10 @@ class BorderedSystem {
   NewtonStep solve(const Eigen::VectorXd& f_int, const Eigen::VectorXd& g) const;
 
   /// Step with the stiffness at `u`: conjugate gradients within J du = g, preconditioned by `solve` (Gould, Hribar,
-  /// Nocedal 2001), until the residual has fallen to `share`. Where the stiffness is not positive the step ends; with
-  /// g = 0 it is still one of descent. Adds what it cost to `solves`.
+  /// Nocedal 2001), until the residual has fallen to `fraction`. Where the stiffness is not positive the step ends;
+  /// with g = 0 it is still one of descent. Adds what it cost to `solves`.
   NewtonStep solve_at(const TetModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& f_int,
-                      const Eigen::VectorXd& g, double share, int& solves);
+                      const Eigen::VectorXd& g, double fraction, int& solves);
 
   /// Unit displacements of footprints, at the state that was factored.
   struct UnitResponse {

@@ -189,7 +189,7 @@ void ContactModel::begin(const Vec3& place_mm, double radius_mm) {
 void ContactModel::end(size_t contact) {
   State::Body& body = state_->body;
   body.patches.erase(body.patches.begin() + static_cast<std::ptrdiff_t>(contact));
-  body.solver->let_go(contact);
+  body.solver->release(contact);
   state_->forget_derivatives();
 }
 

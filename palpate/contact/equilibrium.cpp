@@ -6,30 +6,30 @@
 #include <optional>
 #include <utility>
 
-#include "palpate/contact/secants.h"
+#include "palpate/contact/lbfgs_history.h"
 
 namespace palpate {
 
 namespace {
 
-constexpr int kMostHalvings = 12;
-constexpr int kMostSubdivisions = 5;
-/// Steps with the old factor and its secants go on as long as they make the residual fall to kEnoughShare in every
-/// kPatience of them.
+constexpr int kMaxHalvings = 12;
+constexpr int kMaxSubdivisions = 5;
+/// Steps with the old factor and its L-BFGS history go on as long as they make the residual fall to kEnoughFraction in
+/// every kPatience of them.
 constexpr int kPatience = 4;
-constexpr double kEnoughShare = 0.3;
-/// Such a step is taken when the slope along it has turned by no more than this share: the energy fell (approximate
+constexpr double kEnoughFraction = 0.3;
+/// Such a step is taken when the slope along it has turned by no more than this fraction: the energy fell (approximate
 /// Wolfe condition, Hager and Zhang 2005), without its having to be computed.
 constexpr double kTurnedSlope = 0.8;
-constexpr int kMostTries = 5;
+constexpr int kMaxTries = 5;
 /// Steps of one call that a fresh factor would need as well.
 constexpr int kFreshSteps = 3;
-/// Newton steps solve their linear system to such a share of its residual (in the norm of the preconditioner).
-constexpr double kLeastGradientShare = 0.03, kMostGradientShare = 0.3;
+/// Newton steps solve their linear system to such a fraction of its residual (in the norm of the preconditioner).
+constexpr double kMinGradientFraction = 0.03, kMaxGradientFraction = 0.3;
 /// What a new factor costs, in solves.
 constexpr int kFactorCost = 40;
 /// The contact stiffness is wanted to a per cent of a per cent.
-constexpr double kStiffnessShare = 0.01;
+constexpr double kStiffnessFraction = 0.01;
 /// A step is continued when the tip moves on within this cosine of its direction, and not farther than this.
 constexpr double kSameDirection = 0.9, kFarthestAhead = 2;
 
@@ -68,7 +68,7 @@ struct EquilibriumSolver::State {
   Eigen::SparseMatrix<double> J;  // of all contacts
   std::unique_ptr<BorderedSystem> system;
   std::vector<int> order;  // of elimination
-  Secants secants;
+  LbfgsHistory history;
   Eigen::VectorXd u;                // unknowns of the last equilibrium
   Eigen::VectorXd lambda;           // its multipliers
   Eigen::VectorXd displacement_mm;  // of each contact in turn
@@ -119,7 +119,7 @@ struct EquilibriumSolver::State {
     std::vector<Eigen::SparseMatrix<double>> parts;
     for (const Contact& contact : contacts) parts.push_back(contact.J);
     J = stacked(parts, model.unknown_count());
-    secants.clear();
+    history.clear();
     system.reset();
     if (!contacts.empty()) {
       system = std::make_unique<BorderedSystem>(model, J, order);
@@ -132,7 +132,7 @@ struct EquilibriumSolver::State {
   double energy(const Eigen::VectorXd& reduced) const { return model.energy(model.expand(reduced)); }
   bool exhausted() const { return iterations_left <= 0 || solves_left <= 0; }
 
-  Trial weigh(Eigen::VectorXd reduced, const Eigen::VectorXd& target) const {
+  Trial evaluate(Eigen::VectorXd reduced, const Eigen::VectorXd& target) const {
     Trial trial;
     trial.u = std::move(reduced);
     trial.full = model.expand(trial.u);
@@ -149,20 +149,20 @@ struct EquilibriumSolver::State {
 
   /// Only the neo-Hookean energy has a barrier that a step may jump over.
   bool is_admissible(const Eigen::VectorXd& reduced) const {
-    return model.tissue().law != Law::neo_hookean || std::isfinite(energy(reduced));
+    return !resists_inversion(model.tissue().law) || std::isfinite(energy(reduced));
   }
 
   /// Where the last steps lead when the tip goes on in their direction, else the state as it is.
   Trial begin(const Eigen::VectorXd& p, const Eigen::VectorXd& target) const {
     const Eigen::VectorXd dp_mm = p - displacement_mm;
-    const std::optional<double> share = ahead(dp_mm, last_step);
-    if (!share) return weigh(u, target);
-    Eigen::VectorXd du = *share * last_step.du;
+    const std::optional<double> fraction = ahead(dp_mm, last_step);
+    if (!fraction) return evaluate(u, target);
+    Eigen::VectorXd du = *fraction * last_step.du;
     // With two steps in line, the curve through their ends.
     if (const auto earlier = ahead(last_step.dp_mm, earlier_step); earlier && *earlier > 1 / kFarthestAhead)
-      du += *share * (1 + *share) / (1 + 1 / *earlier) * (last_step.du - *earlier * earlier_step.du);
+      du += *fraction * (1 + *fraction) / (1 + 1 / *earlier) * (last_step.du - *earlier * earlier_step.du);
     const Eigen::VectorXd there = u + du;
-    return weigh(is_admissible(there) ? there : u, target);
+    return evaluate(is_admissible(there) ? there : u, target);
   }
 
   /// How many times the step goes into dp, where it has the same direction.
@@ -170,9 +170,9 @@ struct EquilibriumSolver::State {
     if (step.dp_mm.size() != dp_mm.size()) return std::nullopt;
     const double along = dp_mm.dot(step.dp_mm);
     if (!(along > kSameDirection * dp_mm.norm() * step.dp_mm.norm())) return std::nullopt;
-    const double share = along / step.dp_mm.squaredNorm();
-    if (share >= kFarthestAhead) return std::nullopt;
-    return share;
+    const double fraction = along / step.dp_mm.squaredNorm();
+    if (fraction >= kFarthestAhead) return std::nullopt;
+    return fraction;
   }
 
   void keep(const Trial& trial, const Eigen::VectorXd& p) {
@@ -193,7 +193,7 @@ struct EquilibriumSolver::State {
       if (!system->factorize(model, trial.full)) return {false, trial.residual};
     }
     std::deque<double> residuals;
-    bool slow = false;  // the old factor no longer serves, even with secants
+    bool slow = false;  // the old factor no longer serves, even with its history
     int quasi_steps = 0;
     for (;;) {
       if (trial.constrained && (trial.residual <= options.relative_residual || exhausted())) {
@@ -207,7 +207,7 @@ struct EquilibriumSolver::State {
       if (trial.constrained && !slow) {
         residuals.push_back(trial.residual);
         if (residuals.size() > kPatience) {
-          slow = residuals.back() > kEnoughShare * residuals.front();
+          slow = residuals.back() > kEnoughFraction * residuals.front();
           residuals.pop_front();
         }
       }
@@ -225,42 +225,42 @@ struct EquilibriumSolver::State {
   bool constrain(Trial& trial, const Eigen::VectorXd& target, bool with_tangent) {
     const NewtonStep step = linear_step(trial, with_tangent);
     if (!step.du.allFinite() || !is_admissible(trial.u + step.du)) return false;
-    trial = weigh(trial.u + step.du, target);
+    trial = evaluate(trial.u + step.du, target);
     return true;
   }
 
   NewtonStep linear_step(const Trial& trial, bool with_tangent) {
     int solves = 1;
     // As exact as the distance from balance asks for.
-    const double share = std::max(std::clamp(trial.residual, kLeastGradientShare, kMostGradientShare),
-                                  0.1 * options.relative_residual / trial.residual);
+    const double fraction = std::max(std::clamp(trial.residual, kMinGradientFraction, kMaxGradientFraction),
+                                     0.1 * options.relative_residual / trial.residual);
     const Eigen::VectorXd g = trial.constrained ? Eigen::VectorXd::Zero(trial.g.size()) : trial.g;
-    const NewtonStep step = with_tangent ? system->solve_at(model, trial.full, trial.f_int, g, share, solves)
+    const NewtonStep step = with_tangent ? system->solve_at(model, trial.full, trial.f_int, g, fraction, solves)
                                          : system->solve(trial.f_int, g);
     solves_left -= solves;
     return step;
   }
 
-  /// One step with the old factor and the secants; false when it leads nowhere.
+  /// One step with the old factor and its history; false when it leads nowhere.
   bool quasi_newton_step(Trial& trial, const Eigen::VectorXd& target) {
-    const Eigen::VectorXd du = secants.step(*system, trial.unbalanced);
+    const Eigen::VectorXd du = history.step(*system, trial.unbalanced);
     --solves_left;
     const double slope = trial.unbalanced.dot(du);
     if (!du.allFinite() || !(slope < 0)) {
-      secants.clear();
+      history.clear();
       return false;
     }
     double length = 1;
-    for (int attempt = 0; attempt < kMostTries; ++attempt) {
+    for (int attempt = 0; attempt < kMaxTries; ++attempt) {
       const Eigen::VectorXd s = length * du;
       if (!is_admissible(trial.u + s)) {
         length *= 0.5;
         continue;
       }
-      Trial next = weigh(trial.u + s, target);
+      Trial next = evaluate(trial.u + s, target);
       const double next_slope = next.unbalanced.dot(du);
       if (!std::isfinite(next_slope)) return false;
-      secants.add(s, next.unbalanced - trial.unbalanced);
+      history.add(s, next.unbalanced - trial.unbalanced);
       if (next_slope <= -kTurnedSlope * slope) {
         trial = std::move(next);
         return true;
@@ -277,12 +277,12 @@ struct EquilibriumSolver::State {
     // Along the constraint the energy has to fall (Armijo). Near the solution rounding hides that; the residual tells.
     const double before = energy(trial.u), slope = trial.f_int.dot(step.du);
     double length = 1;
-    for (int halving = 0; halving < kMostHalvings; ++halving, length *= 0.5) {
+    for (int halving = 0; halving < kMaxHalvings; ++halving, length *= 0.5) {
       const double after = energy(trial.u + length * step.du);
       if (!std::isfinite(after)) continue;
       const bool falls = after <= before + 1e-4 * length * std::min(slope, 0.0);
       if (!falls && after > before + 1e-9 * std::abs(before)) continue;
-      Trial next = weigh(trial.u + length * step.du, target);
+      Trial next = evaluate(trial.u + length * step.du, target);
       if (!falls && next.residual > 0.5 * trial.residual) continue;
       trial = std::move(next);
       return true;
@@ -292,7 +292,7 @@ struct EquilibriumSolver::State {
 
   Reached move_to(const Eigen::VectorXd& p, int depth) {
     const Reached reached = newton(p);
-    if (reached.converged || depth >= kMostSubdivisions || exhausted()) return reached;
+    if (reached.converged || depth >= kMaxSubdivisions || exhausted()) return reached;
     const Reached half = move_to(0.5 * (displacement_mm + p), depth + 1);
     return half.converged ? move_to(p, depth + 1) : half;
   }
@@ -321,7 +321,7 @@ struct EquilibriumSolver::State {
     Equilibrium result;
     result.converged = reached.converged;
     result.residual = reached.residual;
-    result.iterations = options.most_iterations - iterations_left;
+    result.iterations = options.max_iterations - iterations_left;
     result.u = model.expand(u);
     result.lambda = lambda;
     result.smallest_volume_ratio = model.smallest_volume_ratio(result.u);
@@ -429,7 +429,7 @@ ContactSensitivity EquilibriumSolver::sensitivity_with(const std::vector<Footpri
   return s.sensitivity_of(s.system->respond(rows, unit_displacements(rows_of_contact, rows.rows())));
 }
 
-void EquilibriumSolver::let_go(size_t number) {
+void EquilibriumSolver::release(size_t number) {
   State& s = *state_;
   s.contacts.erase(s.contacts.begin() + static_cast<std::ptrdiff_t>(number));
   const Eigen::Index after = s.displacement_mm.size() - 3 * static_cast<Eigen::Index>(number) - 3;
@@ -455,7 +455,7 @@ ContactStiffness EquilibriumSolver::contact_stiffness() {
     Eigen::VectorXd along = Eigen::VectorXd::Zero(s.J.rows());
     along.head(rows) = Vec3::Unit(i).replicate(rows / 3, 1);
     int solves = 0;
-    B.col(i) = s.system->solve_at(s.model, s.model.expand(s.u), no_force, along, kStiffnessShare, solves).du;
+    B.col(i) = s.system->solve_at(s.model, s.model.expand(s.u), no_force, along, kStiffnessFraction, solves).du;
     KB.col(i) = s.system->times_stiffness(B.col(i));
   }
   answer.stiffness_N_per_mm = B.transpose() * KB;
@@ -477,7 +477,7 @@ Equilibrium EquilibriumSolver::solve_all(const std::vector<Vec3>& displacements_
   }
   State::Reached reached;
   reached.converged = true;
-  s.iterations_left = s.options.most_iterations;
+  s.iterations_left = s.options.max_iterations;
   const Eigen::VectorXd from = s.displacement_mm;
   Eigen::VectorXd to(from.size());
   double farthest_mm = 0;
@@ -487,7 +487,7 @@ Equilibrium EquilibriumSolver::solve_all(const std::vector<Vec3>& displacements_
     farthest_mm = std::max(farthest_mm, (displacements_mm[i] - from.segment<3>(at)).norm());
   }
   const int parts = std::max(1, static_cast<int>(std::ceil(farthest_mm / s.options.longest_step_mm)));
-  s.solves_left = parts * s.options.most_solves;
+  s.solves_left = parts * s.options.max_solves;
   if (!s.balanced) reached = s.newton(from);
   for (int part = 1; part <= parts && reached.converged; ++part)
     reached = s.move_to(from + (to - from) * part / parts, 0);

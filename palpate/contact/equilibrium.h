@@ -8,10 +8,10 @@ namespace palpate {
 
 struct EquilibriumOptions {
   double relative_residual = 1e-6;  ///< of the largest nodal force
-  int most_iterations = 60;         ///< Newton steps of one call, all parts of the displacement together
+  int max_iterations = 60;          ///< Newton steps of one call, all parts of the displacement together
   /// Bound on the time of one call, counted in solves with the factor (a new factor counts as 40), for each longest
   /// step of displacement.
-  int most_solves = 400;
+  int max_solves = 400;
   double longest_step_mm = 2.0;  ///< prescribed displacement applied at once
 };
 
@@ -63,7 +63,7 @@ class EquilibriumSolver {
   /// Begins one more contact on the tissue as it is now: its displacement counts from here.
   void hold_also(const Footprint& footprint);
   /// Ends contact `number`, counted from 0 in the order in which they were held; those after it move up.
-  void let_go(size_t number);
+  void release(size_t number);
   /// Ends all of them.
   void release();
   /// Other footprints for the contacts that are held, in their order. The tissue stays as it is; displacements count

@@ -17,7 +17,7 @@ namespace {
 
 /// A mean whose node weights (squared) keep less than this once their part in the means before is gone adds nothing
 /// that the mesh could tell apart. On a fine mesh half is left.
-constexpr double kLeastIndependentPart = 0.1;
+constexpr double kMinIndependentPart = 0.1;
 /// Rings of the disc and points on each.
 constexpr int kRings = 8, kRingPoints = 24;
 /// Up to which degree the disc is tied, and what that adds: on triangles with edges h it acts like one larger by
@@ -29,15 +29,15 @@ struct Order {
 };
 constexpr std::array<Order, 5> kOrders = {{{7, 0.50}, {5, 0.46}, {3, 0.39}, {1, 0.30}, {0, 0.30}}};
 /// Of the radius, what that correction leaves at least.
-constexpr double kLeastRadiusShare = 0.3;
+constexpr double kMinRadiusFraction = 0.3;
 
-/// A point of the unit disc and the share of a rigid punch's force around it.
+/// A point of the unit disc and the fraction of a rigid punch's force around it.
 struct DiscPoint {
   Eigen::Vector2d at;
   double weight = 0;
 };
 
-/// With rho = sin t the share of the force 2 pi rho d rho / sqrt(1 - rho^2) is 2 pi sin t dt, which is smooth.
+/// With rho = sin t the fraction of the force 2 pi rho d rho / sqrt(1 - rho^2) is 2 pi sin t dt, which is smooth.
 std::vector<DiscPoint> rigid_disc() {
   std::vector<DiscPoint> points;
   for (int ring = 0; ring < kRings; ++ring) {
@@ -54,7 +54,7 @@ std::vector<DiscPoint> rigid_disc() {
 std::optional<Footprint::Sample> sample_along(const std::vector<Vec3>& nodes, const std::vector<Triangle>& boundary,
                                               const Vec3& point, const Vec3& normal) {
   std::optional<Footprint::Sample> nearest;
-  double least_height = std::numeric_limits<double>::infinity();
+  double min_height = std::numeric_limits<double>::infinity();
   for (const Triangle& t : boundary) {
     const Vec3& a = nodes[static_cast<size_t>(t[0])];
     const Vec3 ab = nodes[static_cast<size_t>(t[1])] - a, ac = nodes[static_cast<size_t>(t[2])] - a;
@@ -62,13 +62,13 @@ std::optional<Footprint::Sample> sample_along(const std::vector<Vec3>& nodes, co
     const double slope = doubled_area.dot(normal);
     if (slope <= 0) continue;
     const double height = doubled_area.dot(a - point) / slope;
-    if (std::abs(height) >= least_height) continue;
+    if (std::abs(height) >= min_height) continue;
     const Vec3 offset = point + height * normal - a;
     const double v = offset.cross(ac).dot(doubled_area) / doubled_area.squaredNorm();
     const double w = ab.cross(offset).dot(doubled_area) / doubled_area.squaredNorm();
     constexpr double kTolerance = -1e-9;
     if (v < kTolerance || w < kTolerance || 1 - v - w < kTolerance) continue;
-    least_height = std::abs(height);
+    min_height = std::abs(height);
     nearest = Footprint::Sample{t, Vec3(1 - v - w, v, w)};
   }
   return nearest;
@@ -92,7 +92,7 @@ bool adds_a_direction(SparseRow row, std::vector<SparseRow>& basis) {
     for (const auto& [node, weight] : direction) row[node] -= along * weight;
   }
   const double left = dot(row, row);
-  if (left < kLeastIndependentPart * before) return false;
+  if (left < kMinIndependentPart * before) return false;
   for (auto& entry : row) entry.second /= std::sqrt(left);
   basis.push_back(row);
   return true;
@@ -149,23 +149,23 @@ double edge_under(const LaidDisc& disc, const std::vector<Vec3>& nodes) {
 /// One row per mean, one column per sample; rows sum to one. Weight functions are 1 + q with q the polynomials up to
 /// `degree`, orthonormal under the punch's pressure.
 Eigen::MatrixXd means_of(const LaidDisc& disc, int degree) {
-  Eigen::VectorXd share(static_cast<Eigen::Index>(disc.points.size()));
-  Eigen::MatrixXd monomials(share.size(), (degree + 1) * (degree + 2) / 2);
-  for (Eigen::Index s = 0; s < share.size(); ++s) {
+  Eigen::VectorXd fraction(static_cast<Eigen::Index>(disc.points.size()));
+  Eigen::MatrixXd monomials(fraction.size(), (degree + 1) * (degree + 2) / 2);
+  for (Eigen::Index s = 0; s < fraction.size(); ++s) {
     const DiscPoint& point = disc.points[static_cast<size_t>(s)];
-    share[s] = point.weight;
+    fraction[s] = point.weight;
     Eigen::Index column = 0;
     for (int total = 0; total <= degree; ++total)
       for (int of_y = 0; of_y <= total; ++of_y)
         monomials(s, column++) = std::pow(point.at[0], total - of_y) * std::pow(point.at[1], of_y);
   }
-  share /= share.sum();
-  const Eigen::VectorXd root = share.cwiseSqrt();
+  fraction /= fraction.sum();
+  const Eigen::VectorXd root = fraction.cwiseSqrt();
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials);
-  const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(share.size(), monomials.cols());
+  const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(fraction.size(), monomials.cols());
   Eigen::MatrixXd means = (root.asDiagonal() * q).transpose();
-  means.row(0) = share;
-  for (Eigen::Index m = 1; m < means.rows(); ++m) means.row(m) += share;
+  means.row(0) = fraction;
+  for (Eigen::Index m = 1; m < means.rows(); ++m) means.row(m) += fraction;
   return means;
 }
 
@@ -210,7 +210,7 @@ Footprint make_footprint(const TetModel& model, const std::vector<Triangle>& bou
   const std::vector<Triangle> near = triangles_near(nodes, boundary, footprint.center_mm, radius_mm);
   const double edge = edge_under(lay_disc(nodes, near, footprint, at_middle, radius_mm), nodes);
   for (const Order& order : kOrders) {
-    const double effective_mm = std::max(radius_mm - order.growth_per_edge * edge, kLeastRadiusShare * radius_mm);
+    const double effective_mm = std::max(radius_mm - order.growth_per_edge * edge, kMinRadiusFraction * radius_mm);
     const LaidDisc disc = lay_disc(nodes, near, footprint, at_middle, effective_mm);
     footprint.samples = disc.samples;
     footprint.means = means_of(disc, order.degree);

@@ -22,14 +22,14 @@ std::string shortest(double value) {
   return fmt::format("{}", value);
 }
 
-constexpr size_t kMostShown = 60;
+constexpr size_t kMaxShown = 60;
 
 /// What a file says, fit for a sentence: on one line and not too long.
 std::string shown(std::string text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = ' ';
-  if (text.size() <= kMostShown) return text;
-  size_t end = kMostShown;
+  if (text.size() <= kMaxShown) return text;
+  size_t end = kMaxShown;
   while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // whole UTF-8 characters
   return text.substr(0, end) + "...";
 }
@@ -116,15 +116,15 @@ std::string yaml_text(const std::string& text) {
 }  // namespace
 
 bool Range::contains(double value) const {
-  return (open_least ? value > least : value >= least) && (open_most ? value < most : value <= most);
+  return (open_min ? value > min : value >= min) && (open_max ? value < max : value <= max);
 }
 
 std::string Range::text() const {
-  const bool lower = std::isfinite(least), upper = std::isfinite(most);
+  const bool lower = std::isfinite(min), upper = std::isfinite(max);
   if (!lower && !upper) return "any";
-  std::string text = lower ? fmt::format("{} {} ", shortest(least), open_least ? "<" : "<=") : "";
+  std::string text = lower ? fmt::format("{} {} ", shortest(min), open_min ? "<" : "<=") : "";
   text += "x";
-  if (upper) text += fmt::format(" {} {}", open_most ? "<" : "<=", shortest(most));
+  if (upper) text += fmt::format(" {} {}", open_max ? "<" : "<=", shortest(max));
   return text;
 }
 

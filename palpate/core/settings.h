@@ -19,10 +19,10 @@ namespace palpate {
 
 /// Both ends included unless `open_*` says otherwise.
 struct Range {
-  double least = -std::numeric_limits<double>::infinity();
-  double most = std::numeric_limits<double>::infinity();
-  bool open_least = false;
-  bool open_most = false;
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool open_min = false;
+  bool open_max = false;
 
   bool contains(double value) const;
   std::string text() const;  ///< "0 < x <= 100"

@@ -30,11 +30,11 @@ size_t edit_distance(const std::string& a, const std::string& b) {
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
   std::string nearest;
-  size_t least = std::max<size_t>(2, word.size() / 2);
+  size_t min = std::max<size_t>(2, word.size() / 2);
   for (const std::string& candidate : candidates) {
     const size_t distance = edit_distance(word, candidate);
-    if (distance < least || (distance == least && nearest.empty())) {
-      least = distance;
+    if (distance < min || (distance == min && nearest.empty())) {
+      min = distance;
       nearest = candidate;
     }
   }

@@ -130,7 +130,7 @@ Table::Table(const std::filesystem::path& file, const std::vector<TableColumn>& 
 /// Separator and header together: the line that names most columns. Where none names any, the last line of words before
 /// the first row of numbers is shown to the user as the header.
 void Table::find_header(const std::vector<TableColumn>& columns) {
-  size_t most = 0, fields_of_shown = 0;
+  size_t max = 0, fields_of_shown = 0;
   for (const char separator : {',', ';', '\t', '|', ' '}) {
     LineSplitter lines(text_, separator);
     std::vector<std::string_view> fields;
@@ -138,8 +138,8 @@ void Table::find_header(const std::vector<TableColumn>& columns) {
     int last_line = 0;
     for (int i = 0; i < kLinesBeforeTable && lines.next(fields); ++i) {
       const size_t found = count_found(columns, fields);
-      if (found > most) {
-        most = found;
+      if (found > max) {
+        max = found;
         separator_ = separator;
         header_line_ = lines.line();
         header_ = std::string(trimmed(lines.whole()));
@@ -149,7 +149,7 @@ void Table::find_header(const std::vector<TableColumn>& columns) {
         last_words = std::string(trimmed(lines.whole()));
         last_line = lines.line();
       }
-      if (most == 0 && has_numbers && fields.size() > fields_of_shown && last_line > 0) {
+      if (max == 0 && has_numbers && fields.size() > fields_of_shown && last_line > 0) {
         fields_of_shown = fields.size();
         separator_ = separator;
         header_ = last_words;

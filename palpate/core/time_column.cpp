@@ -9,6 +9,7 @@
 #include <regex>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/core/units.h"
 
 namespace palpate {
@@ -67,8 +68,7 @@ Extent extent_of(const std::vector<double>& times) {
     extent.last = time;
   }
   if (!steps.empty()) {
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-    extent.step = steps[steps.size() / 2];
+    extent.step = median_of(steps);
   }
   return extent;
 }

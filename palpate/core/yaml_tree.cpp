@@ -7,10 +7,10 @@ namespace palpate {
 namespace {
 
 constexpr int kDeepest = 100;
-constexpr int kMostNodes = 1000000;
+constexpr int kMaxNodes = 1000000;
 
 void count(const YAML::Node& node, int depth, int& nodes) {
-  if (depth > kDeepest || ++nodes > kMostNodes)
+  if (depth > kDeepest || ++nodes > kMaxNodes)
     throw YAML::ParserException(node.Mark(), "it is nested too deeply, or its aliases multiply");
   if (node.IsSequence())
     for (const YAML::Node& item : node) count(item, depth + 1, nodes);

@@ -8,10 +8,10 @@
 #include <limits>
 #include <stdexcept>
 
-#include "palpate/elastic/lanes.h"
 #include "palpate/elastic/material.h"
+#include "palpate/elastic/simd.h"
 
-/// The laws of material.h, each formula written once for a number and for lanes of eight elements.
+/// The laws of material.h, each formula written once for a number and for eight elements at once.
 namespace palpate::laws {
 
 template <class T>
@@ -26,10 +26,10 @@ Eigen::Matrix<T, 9, 1> flat(const Matrix3<T>& A) {
 
 /// f of each lane's own matrix: for laws that need a decomposition.
 template <class Result, class Function>
-Result lane_by_lane(const Matrix3<Lanes>& F, Function f) {
+Result lane_by_lane(const Matrix3<Simd>& F, Function f) {
   Result result;
-  for (int lane = 0; lane < Lanes::kCount; ++lane) {
-    const auto of_lane = f(Mat3(F.unaryExpr([lane](const Lanes& x) { return x[lane]; })));
+  for (int lane = 0; lane < Simd::kCount; ++lane) {
+    const auto of_lane = f(Mat3(F.unaryExpr([lane](const Simd& x) { return x[lane]; })));
     for (int k = 0; k < result.size(); ++k) result.data()[k].set(lane, of_lane.data()[k]);
   }
   return result;
@@ -38,7 +38,7 @@ Result lane_by_lane(const Matrix3<Lanes>& F, Function f) {
 /// W = lambda/2 tr(E)^2 + mu E:E, theta = 1 + tr(E).
 struct SaintVenantKirchhoff {
   /// In uniaxial strain and in uniaxial stress the nominal stress has its extreme at a stretch of 1/sqrt(3) = 0.577.
-  static constexpr double kLeastSquaredStretch = 1.0 / 3.0;
+  static constexpr double kMinSquaredStretch = 1.0 / 3.0;
 
   template <class T>
   static Matrix3<T> green_strain(const Matrix3<T>& F) {
@@ -90,10 +90,52 @@ struct SaintVenantKirchhoff {
 
   /// F^T F less the bound is positive definite exactly where every squared stretch lies above it (Sylvester).
   static bool in_valid_range(const Mat3& F) {
-    const Mat3 above = F.transpose() * F - kLeastSquaredStretch * Mat3::Identity();
+    const Mat3 above = F.transpose() * F - kMinSquaredStretch * Mat3::Identity();
     return F.determinant() > 0 && above(0, 0) > 0 && above.topLeftCorner<2, 2>().determinant() > 0 &&
            above.determinant() > 0;
   }
+};
+
+/// Saint Venant-Kirchhoff with beta b(J), b = -(J - 1)^2 ln J where J < 1 (the barrier of Li et al. 2020): the same law
+/// in tension and, to second order, at rest; infinite where an element would be flat.
+struct SaintVenantKirchhoffBarrier : SaintVenantKirchhoff {
+  static double barrier(double J) {
+    if (J >= 1) return 0;
+    return J > 0 ? -(J - 1) * (J - 1) * std::log(J) : std::numeric_limits<double>::infinity();
+  }
+  static double slope(double J) { return J >= 1 || J <= 0 ? 0 : -2 * (J - 1) * std::log(J) - (J - 1) * (J - 1) / J; }
+  static double curvature(double J) {
+    return J >= 1 || J <= 0 ? 0 : -2 * std::log(J) - 4 * (J - 1) / J + (J - 1) * (J - 1) / (J * J);
+  }
+
+  template <class T>
+  static T energy_density(const Lame& lame, const Matrix3<T>& F) {
+    return SaintVenantKirchhoff::energy_density(lame, F) + lame.barrier * each(T(F.determinant()), barrier);
+  }
+
+  template <class T>
+  static Matrix3<T> first_piola_stress(const Lame& lame, const Matrix3<T>& F) {
+    const T J = F.determinant();
+    const T pull = lame.barrier * each(J, slope) * J;
+    return SaintVenantKirchhoff::first_piola_stress(lame, F) + pull * Matrix3<T>(F.inverse().transpose());
+  }
+
+  template <class T>
+  static Matrix9<T> stress_derivative(const Lame& lame, const Matrix3<T>& F) {
+    const T J = F.determinant();
+    const Matrix3<T> G = F.inverse().transpose();
+    const T first = lame.barrier * each(J, slope) * J, second = lame.barrier * each(J, curvature) * J * J;
+    Matrix9<T> C = SaintVenantKirchhoff::stress_derivative(lame, F);
+    for (int l = 0; l < 3; ++l)
+      for (int k = 0; k < 3; ++k)
+        for (int j = 0; j < 3; ++j)
+          for (int i = 0; i < 3; ++i)
+            C(i + 3 * j, k + 3 * l) += (second + first) * G(i, j) * G(k, l) - first * G(i, l) * G(k, j);
+    return C;
+  }
+
+  /// The barrier outweighs what plain Saint Venant-Kirchhoff loses.
+  static bool in_valid_range(const Mat3& F) { return F.determinant() > 0; }
 };
 
 /// W = mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, theta = J.
@@ -167,7 +209,7 @@ struct NeoHookean {
 };
 
 /// Of the sum of two stretches, where the derivative of the rotation has its pole.
-constexpr double kLeastStretchSum = 1e-6;
+constexpr double kMinStretchSum = 1e-6;
 
 /// F = R S with a proper rotation R = U V^T and S = V diag(stretch) V^T; where F is inverted, the last stretch is
 /// negative.
@@ -193,7 +235,7 @@ struct Polar {
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3;
       const auto turn = flat<double>(U.col(i) * V.col(j).transpose() - U.col(j) * V.col(i).transpose());
-      D += turn * turn.transpose() / std::max(stretch[i] + stretch[j], kLeastStretchSum);
+      D += turn * turn.transpose() / std::max(stretch[i] + stretch[j], kMinStretchSum);
     }
     return D;
   }
@@ -222,25 +264,25 @@ struct Corotated {
   static Mat3 volume_ratio_gradient(const Mat3& F) { return Polar(F).R; }
   static Mat9 volume_ratio_curvature(const Mat3& F) { return Polar(F).rotation_derivative(); }
 
-  static Lanes energy_density(const Lame& lame, const Matrix3<Lanes>& F) {
-    return lane_by_lane<Eigen::Matrix<Lanes, 1, 1>>(
+  static Simd energy_density(const Lame& lame, const Matrix3<Simd>& F) {
+    return lane_by_lane<Eigen::Matrix<Simd, 1, 1>>(
         F, [&lame](const Mat3& one) { return Eigen::Matrix<double, 1, 1>(energy_density(lame, one)); })(0);
   }
-  static Matrix3<Lanes> first_piola_stress(const Lame& lame, const Matrix3<Lanes>& F) {
-    return lane_by_lane<Matrix3<Lanes>>(F, [&lame](const Mat3& one) { return first_piola_stress(lame, one); });
+  static Matrix3<Simd> first_piola_stress(const Lame& lame, const Matrix3<Simd>& F) {
+    return lane_by_lane<Matrix3<Simd>>(F, [&lame](const Mat3& one) { return first_piola_stress(lame, one); });
   }
-  static Matrix9<Lanes> stress_derivative(const Lame& lame, const Matrix3<Lanes>& F) {
-    return lane_by_lane<Matrix9<Lanes>>(F, [&lame](const Mat3& one) { return stress_derivative(lame, one); });
+  static Matrix9<Simd> stress_derivative(const Lame& lame, const Matrix3<Simd>& F) {
+    return lane_by_lane<Matrix9<Simd>>(F, [&lame](const Mat3& one) { return stress_derivative(lame, one); });
   }
-  static Lanes volume_ratio(const Matrix3<Lanes>& F) {
-    return lane_by_lane<Eigen::Matrix<Lanes, 1, 1>>(
+  static Simd volume_ratio(const Matrix3<Simd>& F) {
+    return lane_by_lane<Eigen::Matrix<Simd, 1, 1>>(
         F, [](const Mat3& one) { return Eigen::Matrix<double, 1, 1>(volume_ratio(one)); })(0);
   }
-  static Matrix3<Lanes> volume_ratio_gradient(const Matrix3<Lanes>& F) {
-    return lane_by_lane<Matrix3<Lanes>>(F, [](const Mat3& one) { return volume_ratio_gradient(one); });
+  static Matrix3<Simd> volume_ratio_gradient(const Matrix3<Simd>& F) {
+    return lane_by_lane<Matrix3<Simd>>(F, [](const Mat3& one) { return volume_ratio_gradient(one); });
   }
-  static Matrix9<Lanes> volume_ratio_curvature(const Matrix3<Lanes>& F) {
-    return lane_by_lane<Matrix9<Lanes>>(F, [](const Mat3& one) { return volume_ratio_curvature(one); });
+  static Matrix9<Simd> volume_ratio_curvature(const Matrix3<Simd>& F) {
+    return lane_by_lane<Matrix9<Simd>>(F, [](const Mat3& one) { return volume_ratio_curvature(one); });
   }
 
   /// At kept volume ratio the stiffness against a shear of two principal directions is 2 mu (1 - 1 / (sum of their
@@ -305,6 +347,8 @@ auto with_law(Law law, Function f) {
   switch (law) {
     case Law::saint_venant_kirchhoff:
       return f(SaintVenantKirchhoff());
+    case Law::saint_venant_kirchhoff_barrier:
+      return f(SaintVenantKirchhoffBarrier());
     case Law::neo_hookean:
       return f(NeoHookean());
     case Law::corotated:

@@ -25,7 +25,7 @@ double bulk_modulus(const Lame& lame) {
 }
 
 Lame without_bulk(const Lame& lame) {
-  return {-2.0 / 3.0 * lame.mu, lame.mu};
+  return {-2.0 / 3.0 * lame.mu, lame.mu, lame.barrier};
 }
 
 double volume_ratio(Law law, const Mat3& F) {
@@ -42,6 +42,10 @@ Mat9 volume_ratio_curvature(Law law, const Mat3& F) {
 
 bool in_valid_range(Law law, const Mat3& F) {
   return with_law(law, [&](auto l) { return l.in_valid_range(F); });
+}
+
+bool resists_inversion(Law law) {
+  return law == Law::saint_venant_kirchhoff_barrier || law == Law::neo_hookean;
 }
 
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F) {

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-enum class Law { saint_venant_kirchhoff, neo_hookean, corotated, linear };
+enum class Law { saint_venant_kirchhoff, saint_venant_kirchhoff_barrier, neo_hookean, corotated, linear };
 
 /// Constants of one tissue among several; the law is the same for all.
 struct Stiffness {
@@ -51,6 +51,7 @@ using Mat9 = Eigen::Matrix<double, 9, 9>;
 struct Lame {
   double lambda = 0;
   double mu = 0;
+  double barrier = 0;  ///< beta of saint-venant-kirchhoff-barrier
 };
 Lame lame_of(const TissueOptions& tissue);
 /// The one of elements with this label.
@@ -58,6 +59,8 @@ Lame lame_of(const TissueOptions& tissue, int label);
 
 /// Strain energy per rest volume, N mm / mm^3.
 ///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E
+///   saint-venant-kirchhoff-barrier: the same, and where J = det F < 1 also -beta (J - 1)^2 ln J, beta = (lambda + 2
+///   mu) / 20: the least that keeps confined compression stiff for every Poisson's ratio is (lambda + 2 mu) / 36
 ///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus,
 ///   CalculiX)
 ///   corotated:              lambda/2 tr(S - I)^2 + mu |S - I|^2 with F = R S, R a rotation also where F is inverted
@@ -83,10 +86,13 @@ Mat9 volume_ratio_curvature(Law law, const Mat3& F);
 
 /// Whether the law means something at F; beyond, its answer is not to be trusted.
 ///   saint-venant-kirchhoff: every stretch above 1/sqrt(3), below which more compression takes less force
-///   neo-hookean:            not inverted
+///   saint-venant-kirchhoff-barrier, neo-hookean: not inverted
 ///   corotated:              not inverted, and the sum of any two stretches above 1, below which shear has no stiffness
 ///   linear:                 |F - I| <= 0.1: strain and rotation are small
 bool in_valid_range(Law law, const Mat3& F);
+
+/// Whether the energy grows without bound before an element is inverted.
+bool resists_inversion(Law law);
 
 /// P F^T / J, MPa; of the linear law, which does not tell the two states apart, P.
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F);

@@ -12,14 +12,14 @@ namespace palpate {
 namespace {
 
 /// Below this many elements a slab is not worth a thread of its own.
-constexpr int kElementsPerSlab = 2500, kMostSlabs = 8;
+constexpr int kElementsPerSlab = 2500, kMaxSlabs = 8;
 
 /// Slab of every node along the longest side of the body, about equally many nodes each.
 std::vector<int> slabs_of_nodes(const std::vector<Vec3>& nodes, int slabs) {
-  Vec3 least = nodes.front(), most = least;
-  for (const Vec3& node : nodes) least = least.cwiseMin(node), most = most.cwiseMax(node);
+  Vec3 min = nodes.front(), max = min;
+  for (const Vec3& node : nodes) min = min.cwiseMin(node), max = max.cwiseMax(node);
   Eigen::Index axis = 0;
-  (most - least).maxCoeff(&axis);
+  (max - min).maxCoeff(&axis);
   std::vector<size_t> order(nodes.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return nodes[a][axis] < nodes[b][axis]; });
@@ -54,27 +54,27 @@ TetModel::TetModel(const TetMesh& mesh, const TissueOptions& tissue, const std::
     first = unknown_count_;
     unknown_count_ += 3;
   }
-  if (element == Element::averaged) build_stars();
+  if (element == Element::averaged) build_patches();
   build_pattern();
   build_order();
 }
 
-void TetModel::build_stars() {
-  stars_.resize(rest_.size());
+void TetModel::build_patches() {
+  patches_.resize(rest_.size());
   for (size_t e = 0; e < tetrahedra_.size(); ++e)
-    for (int node : tetrahedra_[e]) stars_[static_cast<size_t>(node)].elements.push_back(static_cast<int>(e));
-  for (Star& star : stars_) {
-    star.node = static_cast<int>(&star - stars_.data());
-    for (int e : star.elements) {
+    for (int node : tetrahedra_[e]) patches_[static_cast<size_t>(node)].elements.push_back(static_cast<int>(e));
+  for (NodalPatch& patch : patches_) {
+    patch.node = static_cast<int>(&patch - patches_.data());
+    for (int e : patch.elements) {
       const double quarter_mm3 = rest_volume_mm3_[static_cast<size_t>(e)] / 4;
-      star.bulk_MPa =
-          (star.volume_mm3 * star.bulk_MPa + quarter_mm3 * bulk_modulus(lame(e))) / (star.volume_mm3 + quarter_mm3);
-      star.volume_mm3 += quarter_mm3;
+      patch.bulk_MPa =
+          (patch.volume_mm3 * patch.bulk_MPa + quarter_mm3 * bulk_modulus(lame(e))) / (patch.volume_mm3 + quarter_mm3);
+      patch.volume_mm3 += quarter_mm3;
       for (int node : tetrahedra_[static_cast<size_t>(e)])
-        if (!is_fixed(node)) star.free_nodes.push_back(node);
+        if (!is_fixed(node)) patch.free_nodes.push_back(node);
     }
-    std::sort(star.free_nodes.begin(), star.free_nodes.end());
-    star.free_nodes.erase(std::unique(star.free_nodes.begin(), star.free_nodes.end()), star.free_nodes.end());
+    std::sort(patch.free_nodes.begin(), patch.free_nodes.end());
+    patch.free_nodes.erase(std::unique(patch.free_nodes.begin(), patch.free_nodes.end()), patch.free_nodes.end());
   }
 }
 
@@ -91,14 +91,14 @@ void TetModel::build_pattern() {
     if (is_fixed(a) || is_fixed(b) || b < a) return;
     below[static_cast<size_t>(a)].push_back(b);
   };
-  if (stars_.empty()) {
+  if (patches_.empty()) {
     for (const Tetrahedron& t : tetrahedra_)
       for (int a : t)
         for (int b : t) couple(a, b);
   }
-  for (const Star& star : stars_)
-    for (int a : star.free_nodes)
-      for (int b : star.free_nodes) couple(a, b);
+  for (const NodalPatch& patch : patches_)
+    for (int a : patch.free_nodes)
+      for (int b : patch.free_nodes) couple(a, b);
   Eigen::VectorXi entries_of_column = Eigen::VectorXi::Zero(unknown_count_);
   for (size_t a = 0; a < below.size(); ++a) {
     std::sort(below[a].begin(), below[a].end());
@@ -115,10 +115,10 @@ void TetModel::build_pattern() {
           pattern_.insert(first_unknown(b) + r, first_unknown_[a] + c) = 0;
   pattern_.makeCompressed();
 
-  for (Star& star : stars_)
-    for (auto column = star.free_nodes.begin(); column != star.free_nodes.end(); ++column)
-      for (auto row = column; row != star.free_nodes.end(); ++row)
-        star.block_start.push_back(position(first_unknown(*row), first_unknown(*column)));
+  for (NodalPatch& patch : patches_)
+    for (auto column = patch.free_nodes.begin(); column != patch.free_nodes.end(); ++column)
+      for (auto row = column; row != patch.free_nodes.end(); ++row)
+        patch.block_start.push_back(position(first_unknown(*row), first_unknown(*column)));
   scatter_.resize(tetrahedra_.size());
   for (size_t e = 0; e < tetrahedra_.size(); ++e) {
     size_t pair = 0;
@@ -135,28 +135,28 @@ void TetModel::build_pattern() {
 }
 
 void TetModel::build_order() {
-  const int slabs = std::clamp(element_count() / kElementsPerSlab, 1, kMostSlabs);
+  const int slabs = std::clamp(element_count() / kElementsPerSlab, 1, kMaxSlabs);
   const std::vector<int> slab_of_node = slabs_of_nodes(rest_, slabs);
-  std::vector<int> least, most;
+  std::vector<int> min, max;
   const auto add_item = [&](const auto& nodes) {
     int low = slabs, high = 0;
     for (int node : nodes) {
       low = std::min(low, slab_of_node[static_cast<size_t>(node)]);
       high = std::max(high, slab_of_node[static_cast<size_t>(node)]);
     }
-    least.push_back(std::min(low, high));
-    most.push_back(high);
+    min.push_back(std::min(low, high));
+    max.push_back(high);
   };
   for (const Tetrahedron& t : tetrahedra_) add_item(t);
   std::vector<Lame> of_label;
   for (int label = 0; label <= static_cast<int>(tissue_.of_label.size()); ++label)
-    of_label.push_back(stars_.empty() ? lame_of(tissue_, label) : without_bulk(lame_of(tissue_, label)));
-  packs_ = std::make_shared<ElementPacks>(pack_elements(order_in_phases(least, most, slabs), tetrahedra_,
+    of_label.push_back(patches_.empty() ? lame_of(tissue_, label) : without_bulk(lame_of(tissue_, label)));
+  packs_ = std::make_shared<ElementPacks>(pack_elements(color_batches(min, max, slabs), tetrahedra_,
                                                         inverse_rest_edges_, rest_volume_mm3_, label_, of_label));
-  least.clear();
-  most.clear();
-  for (const Star& star : stars_) add_item(star.free_nodes);
-  star_phases_ = std::make_shared<Phases>(order_in_phases(least, most, slabs));
+  min.clear();
+  max.clear();
+  for (const NodalPatch& patch : patches_) add_item(patch.free_nodes);
+  patch_batches_ = std::make_shared<ColoredBatches>(color_batches(min, max, slabs));
 }
 
 Mat3 TetModel::deformation_gradient(const Eigen::VectorXd& u, int element) const {

@@ -12,7 +12,7 @@
 namespace palpate {
 
 struct ElementPacks;
-struct Phases;
+struct ColoredBatches;
 
 /// How the energy of a change of volume is measured. Linear tetrahedra with a volume ratio each of their own lock in
 /// nearly incompressible tissue and overstate the force. Averaged over the elements around each node (energy-based, so
@@ -67,7 +67,7 @@ class TetModel {
 
  private:
   /// The elements around one node, a quarter of each: they share one volume ratio.
-  struct Star {
+  struct NodalPatch {
     int node = 0;
     double volume_mm3 = 0;
     double bulk_MPa = 0;  // mean over the volume
@@ -83,25 +83,25 @@ class TetModel {
     std::array<bool, 10> turned;
   };
 
-  void build_stars();
+  void build_patches();
   void build_pattern();
   void build_order();
   int position(int row, int column) const;
   /// kappa (theta - 1) of every star, MPa; empty for Element::linear.
-  Eigen::VectorXd star_pressure_MPa(const Eigen::VectorXd& u) const;
+  Eigen::VectorXd patch_pressure_MPa(const Eigen::VectorXd& u) const;
   template <class L>
   void add_element_forces(const Eigen::VectorXd& u, const Eigen::VectorXd& pressure, Eigen::VectorXd& force) const;
   template <class L>
   void add_element_tangents(const Eigen::VectorXd& u, const Eigen::VectorXd& pressure, bool project,
                             double* values) const;
-  void add_star_tangents(const Eigen::VectorXd& u, double* values) const;
+  void add_patch_tangents(const Eigen::VectorXd& u, double* values) const;
   void add_block(const Vec3& row, const Vec3& column, bool diagonal, int first_column, int start, double* values) const;
 
   std::vector<Vec3> rest_;
   std::vector<Tetrahedron> tetrahedra_;
   TissueOptions tissue_;
   std::vector<int> label_;                // of each element, 0 to the number of labels that the tissue knows
-  std::vector<Star> stars_;               // one per node; empty for Element::linear
+  std::vector<NodalPatch> patches_;       // one per node; empty for Element::linear
   std::vector<Mat3> inverse_rest_edges_;  // D_m^-1
   std::vector<double> rest_volume_mm3_;
   std::vector<int> first_unknown_;
@@ -110,7 +110,7 @@ class TetModel {
   Eigen::SparseMatrix<double> pattern_;
   std::vector<Scatter> scatter_;               // one per element
   std::shared_ptr<const ElementPacks> packs_;  // what the loops over elements run on
-  std::shared_ptr<const Phases> star_phases_;
+  std::shared_ptr<const ColoredBatches> patch_batches_;
 };
 
 }  // namespace palpate

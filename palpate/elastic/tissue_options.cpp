@@ -34,6 +34,9 @@ std::string preset_list() {
 
 constexpr double kModulusWhereUnknown_kPa = 1;
 
+/// Of the modulus of confined compression (material.h).
+constexpr double kBarrierRatio = 0.05;
+
 void fill_from_preset(TissueOptions& tissue) {
   if (tissue.preset.empty()) {
     if (tissue.modulus_unknown) tissue.young_modulus_kPa = kModulusWhereUnknown_kPa;
@@ -58,8 +61,10 @@ void fill_from_preset(TissueOptions& tissue) {
 }  // namespace
 
 void describe(Settings& settings, TissueOptions& options) {
-  settings.choice("law", options.law, law_words(),
-                  "elastic law; neo-hookean is the one to use for pushing, linear holds for small motions only");
+  settings.choice(
+      "law", options.law, law_words(),
+      "elastic law; saint-venant-kirchhoff-barrier or neo-hookean for pushing, where the plain one loses its "
+      "stiffness; linear holds for small motions only");
   settings.number_or_word("young_modulus_kPa", options.young_modulus_kPa, {0, 1e8, true, false}, "unknown",
                           options.modulus_unknown,
                           "Young's modulus E; the force is proportional to it. unknown: forces are N per kPa of E, and "
@@ -72,6 +77,7 @@ void describe(Settings& settings, TissueOptions& options) {
 const std::vector<std::pair<std::string, Law>>& law_words() {
   static const std::vector<std::pair<std::string, Law>> kWords = {
       {"saint-venant-kirchhoff", Law::saint_venant_kirchhoff},
+      {"saint-venant-kirchhoff-barrier", Law::saint_venant_kirchhoff_barrier},
       {"neo-hookean", Law::neo_hookean},
       {"corotated", Law::corotated},
       {"linear", Law::linear}};
@@ -98,7 +104,8 @@ std::string modulus_text(const TissueOptions& tissue) {
 
 Lame lame_of(const TissueOptions& tissue) {
   const double E = tissue.young_modulus_MPa(), nu = tissue.poisson_ratio;
-  return {E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))};
+  const double lambda = E * nu / ((1 + nu) * (1 - 2 * nu)), mu = E / (2 * (1 + nu));
+  return {lambda, mu, kBarrierRatio * (lambda + 2 * mu)};
 }
 
 Lame lame_of(const TissueOptions& tissue, int label) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 
 namespace palpate {
 
@@ -16,7 +17,7 @@ namespace {
 /// A registration is good to a few millimetres; further off, the contact would meet another place of the organ.
 constexpr double kFarthest_mm = 10;
 /// Fewer vertices than this in view say nothing about the depth.
-constexpr size_t kFewestSeen = 5;
+constexpr size_t kMinSeen = 5;
 
 /// Depth of each vertex that looks at the camera minus the measured depth at its pixel, mm.
 std::vector<double> depth_errors_mm(const Surface& body, const DisparityMap& disparity,
@@ -37,10 +38,10 @@ std::vector<double> depth_errors_mm(const Surface& body, const DisparityMap& dis
 }
 
 std::string extent(const Surface& body) {
-  Vec3 least = Vec3::Constant(1e300), most = -least;
-  for (const Vec3& v : body.vertices_mm) least = least.cwiseMin(v), most = most.cwiseMax(v);
-  return fmt::format("x {:.4g}..{:.4g}, y {:.4g}..{:.4g}, z {:.4g}..{:.4g} mm", least.x(), most.x(), least.y(),
-                     most.y(), least.z(), most.z());
+  Vec3 min = Vec3::Constant(1e300), max = -min;
+  for (const Vec3& v : body.vertices_mm) min = min.cwiseMin(v), max = max.cwiseMax(v);
+  return fmt::format("x {:.4g}..{:.4g}, y {:.4g}..{:.4g}, z {:.4g}..{:.4g} mm", min.x(), max.x(), min.y(), max.y(),
+                     min.z(), max.z());
 }
 
 }  // namespace
@@ -49,14 +50,13 @@ void require_body_where_seen(const Surface& body, const DisparityMap& disparity,
                              const cv::Mat& organ_mask, const std::filesystem::path& volume_file) {
   constexpr const char* kExpected = "expected the organ in the left camera frame (is volume_unit right?)";
   std::vector<double> errors = depth_errors_mm(body, disparity, rectification, organ_mask);
-  if (errors.size() < kFewestSeen)
+  if (errors.size() < kMinSeen)
     throw BadInput(fmt::format("map.volume: {} lies at {}, outside of the measured tissue, {}", volume_file.string(),
                                extent(body), kExpected));
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  if (std::abs(*middle) > kFarthest_mm)
+  const auto middle = median_of(errors);
+  if (std::abs(middle) > kFarthest_mm)
     throw BadInput(fmt::format("map.volume: {} lies {:.0f} mm {} the measured tissue (it is at {}), {}",
-                               volume_file.string(), std::abs(*middle), *middle > 0 ? "behind" : "in front of",
+                               volume_file.string(), std::abs(middle), middle > 0 ? "behind" : "in front of",
                                extent(body), kExpected));
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
@@ -14,9 +16,7 @@ double middle_depth_mm(const PointCloud& cloud) {
   std::vector<double> depths;
   for (size_t i = 0; i < cloud.size(); i += cloud.size() / kLookedAt + 1) depths.push_back(cloud.position_mm[i].z());
   if (depths.empty()) return 1;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return median_of(depths);
 }
 
 }  // namespace

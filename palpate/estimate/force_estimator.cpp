@@ -183,12 +183,12 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   estimate.time_s = frame.time_s;
   estimate.status = FrameStatus::tool_lost;
   if (s.map.tissue.modulus_unknown) estimate.warnings.push_back("modulus_unknown");
-  estimate.further.resize(kMostInstruments - 1, estimate);
+  estimate.further.resize(kMaxInstruments - 1, estimate);
   const auto of = [&estimate](size_t instrument) -> ForceEstimate& {
     return instrument == 0 ? estimate : estimate.further[instrument - 1];
   };
   if (frame.left.empty() || frame.right.empty()) {
-    for (size_t i = 0; i < kMostInstruments; ++i) of(i).warnings.push_back("camera_missing");
+    for (size_t i = 0; i < kMaxInstruments; ++i) of(i).warnings.push_back("camera_missing");
     return estimate;
   }
 
@@ -222,7 +222,7 @@ ForceEstimate ForceEstimator::update(const StereoFrame& frame) {
   if (after_map && found < s.tuning.min_points * asked) answer.explained = false;
   estimate.times.solve_ms = watch.lap_ms();
 
-  for (size_t i = 0; i < kMostInstruments; ++i) {
+  for (size_t i = 0; i < kMaxInstruments; ++i) {
     if (answer.instruments[i].begins) s.instruments.mark(i);
     if (instruments.eyes_out_of_step) of(i).warnings.push_back("eyes_out_of_step");
     if (obscured) continue;

@@ -17,13 +17,12 @@ const std::vector<std::string> kInstrumentKeysNotYet = {"[1]"};
 const std::vector<std::string> kSceneKeysNotYet = {"instruments", "instrument_2"};
 
 void check_map(const MapOptions& options) {
-  constexpr double kMostFrames = 100;
+  constexpr double kMaxFrames = 100;
   const auto [first, last] = std::pair{options.frames.x, options.frames.y};
-  if (first < 0 || last < first || last - first >= kMostFrames || first != std::floor(first) ||
-      last != std::floor(last))
+  if (first < 0 || last < first || last - first >= kMaxFrames || first != std::floor(first) || last != std::floor(last))
     throw BadInput(fmt::format(
         "map.frames is [{:g}, {:g}], expected the first and the last of at most {:g} frames, counted from 0", first,
-        last, kMostFrames));
+        last, kMaxFrames));
   if (options.has_focus && !options.focus_px.empty())
     throw BadInput("map has both focus and focus_px, expected one of them");
   if (options.register_volume && options.volume.empty())

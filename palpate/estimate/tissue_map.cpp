@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/build_stages.h"
 #include "palpate/estimate/check_map.h"
@@ -60,24 +61,17 @@ std::optional<MeshFocus> focus_of(const MapOptions& options, const Surface& seen
 
 /// Moves the body where the camera sees it. Throws BadInput where it fits worse than the options allow.
 Registration register_to(const PointCloud& seen, const MapOptions& options, Surface& body) {
-  constexpr double kLeastShare = 0.6;
+  constexpr double kMinFraction = 0.6;
   const Registration found = register_body(
       body, seen.position_mm, options.has_register_from ? std::optional(options.register_from) : std::nullopt);
-  if (found.residual_mm > options.register_limit_mm || found.matched_share < kLeastShare)
+  if (found.residual_mm > options.register_limit_mm || found.matched_fraction < kMinFraction)
     throw BadInput(fmt::format(
         "map.register: {} fits the measured tissue to {:.2f} mm over {:.0f} % of it, expected at most {:g} mm over at "
         "least {:.0f} % (is it this organ? say roughly where it lies by register_from)",
-        options.volume.string(), found.residual_mm, 100 * found.matched_share, options.register_limit_mm,
-        100 * kLeastShare));
+        options.volume.string(), found.residual_mm, 100 * found.matched_fraction, options.register_limit_mm,
+        100 * kMinFraction));
   for (Vec3& v : body.vertices_mm) v = found.apply(v);
   return found;
-}
-
-double median_of(std::vector<float> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -164,7 +158,7 @@ TissueMap build_tissue_map(const std::vector<StereoFrame>& static_frames, const 
 
   map.report.matched_points = static_cast<int>(map.cloud.size());
   map.report.coverage = static_cast<double>(map.cloud.size()) / std::max(1, cv::countNonZero(map.organ_mask));
-  map.report.median_depth_deviation_mm = median_of(map.cloud.depth_deviation_mm);
+  map.report.median_depth_deviation_mm = static_cast<double>(median_of(map.cloud.depth_deviation_mm));
   return map;
 }
 

@@ -53,7 +53,7 @@ struct MapReport {
   double rectify_ms = 0, match_ms = 0, triangulate_ms = 0, edges_ms = 0, surface_ms = 0, register_ms = 0, volume_ms = 0,
          attachments_ms = 0;
   int matched_points = 0;
-  double coverage = 0;  ///< share of the organ region with a measured disparity
+  double coverage = 0;  ///< fraction of the organ region with a measured disparity
   double median_depth_deviation_mm = 0;
   MeshReport mesh;
   std::optional<Registration> registration;

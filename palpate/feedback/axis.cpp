@@ -15,11 +15,11 @@ double round_up(double value) {
   return 10 * decade;
 }
 
-std::vector<double> round_ticks(double least, double most, int count) {
-  if (!(most > least)) return {least};
-  const double step = round_up((most - least) / std::max(count, 1));
+std::vector<double> round_ticks(double min, double max, int count) {
+  if (!(max > min)) return {min};
+  const double step = round_up((max - min) / std::max(count, 1));
   std::vector<double> ticks;
-  for (double i = std::ceil(least / step - 1e-9); i * step <= most + 1e-9 * step; ++i) ticks.push_back(i * step);
+  for (double i = std::ceil(min / step - 1e-9); i * step <= max + 1e-9 * step; ++i) ticks.push_back(i * step);
   return ticks;
 }
 

@@ -9,7 +9,7 @@ namespace palpate {
 double round_up(double value);
 
 /// Round numbers (steps of 1, 2, 5 times a power of ten) within [least, most], about `count` of them, ascending.
-std::vector<double> round_ticks(double least, double most, int count);
+std::vector<double> round_ticks(double min, double max, int count);
 
 /// A tick without needless digits: "0", "0.5", "-20".
 std::string tick_text(double tick);

@@ -8,7 +8,7 @@ namespace palpate {
 
 namespace {
 
-constexpr size_t kMostDelays = 12;
+constexpr size_t kMaxDelays = 12;
 
 /// Mean of the values that fall into each step of a grid; empty steps are filled along the line between their
 /// neighbours. Three rows, one per axis.
@@ -109,7 +109,7 @@ double score_at(int shift, const cv::Mat_<double>& sums, const RunningSums& vide
 }  // namespace
 
 std::vector<double> likely_delays_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor,
-                                    double least_overlap, double step_s) {
+                                    double min_overlap, double step_s) {
   const cv::Mat_<double> video = on_grid(
       estimate, step_s, [](const ForceRow& row) { return row.time_s; },
       [](const ForceRow& row) -> const Vec3& { return row.force_N; });
@@ -118,16 +118,16 @@ std::vector<double> likely_delays_s(const std::vector<ForceRow>& estimate, const
       [](const SensorReading& reading) -> const Vec3& { return reading.force_N; });
   const cv::Mat_<double> sums = cross_sums(video, log);
   const RunningSums video_sums(video), log_sums(log);
-  const int least = std::max(2, static_cast<int>(std::ceil(least_overlap * video.cols)));
+  const int min = std::max(2, static_cast<int>(std::ceil(min_overlap * video.cols)));
   std::vector<std::pair<double, int>> scores;
-  for (int shift = least - video.cols; shift <= log.cols - least; ++shift)
+  for (int shift = min - video.cols; shift <= log.cols - min; ++shift)
     scores.emplace_back(score_at(shift, sums, video_sums, log_sums), shift);
   std::vector<std::pair<double, int>> peaks;
   for (size_t i = 0; i < scores.size(); ++i) {
     const double before = i > 0 ? scores[i - 1].first : -1, after = i + 1 < scores.size() ? scores[i + 1].first : -1;
     if (scores[i].first >= before && scores[i].first >= after) peaks.push_back(scores[i]);
   }
-  const size_t kept = std::min(peaks.size(), kMostDelays);
+  const size_t kept = std::min(peaks.size(), kMaxDelays);
   std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(kept), peaks.end(), std::greater<>());
   std::vector<double> delays_s;
   for (size_t i = 0; i < kept; ++i)

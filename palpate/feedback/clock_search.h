@@ -11,6 +11,6 @@ namespace palpate {
 /// cross-correlation of both on a common grid (FFT), normalised for what overlaps: the score of a delay is the norm of
 /// the 3 x 3 cross-covariance, which no rotation changes. Empty where they overlap nowhere by that much.
 std::vector<double> likely_delays_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor,
-                                    double least_overlap, double step_s);
+                                    double min_overlap, double step_s);
 
 }  // namespace palpate

@@ -18,8 +18,8 @@ ColourTable colour_table(ColourMap map) {
   return table;
 }
 
-cv::Vec3b colour_at(const ColourTable& table, double share) {
-  return table[static_cast<size_t>(std::lround(255 * std::clamp(share, 0.0, 1.0)))];
+cv::Vec3b colour_at(const ColourTable& table, double fraction) {
+  return table[static_cast<size_t>(std::lround(255 * std::clamp(fraction, 0.0, 1.0)))];
 }
 
 void draw_colour_bar(cv::Mat& image, const cv::Rect& area, const ColourTable& table, const ColourBar& bar,
@@ -37,8 +37,8 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& area, const ColourTable& ta
     const cv::Vec3b colour = colour_at(table, (bottom - 1 - y) / std::max(1.0, strip.height - 1.0));
     cv::line(image, {strip.x, y}, {strip.br().x - 1, y}, colour);
   }
-  for (const double tick : round_ticks(bar.least, bar.most, 5)) {
-    const int y = cvRound(bottom - 1 - (tick - bar.least) / (bar.most - bar.least) * (strip.height - 1));
+  for (const double tick : round_ticks(bar.min, bar.max, 5)) {
+    const int y = cvRound(bottom - 1 - (tick - bar.min) / (bar.max - bar.min) * (strip.height - 1));
     cv::line(image, {strip.br().x, y}, {strip.br().x + gap / 2, y}, kInk);
     draw_text(image, tick_text(tick), {strip.br().x + gap, y + cvRound(text_px / 2)}, text_px, kInk);
   }

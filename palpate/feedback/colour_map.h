@@ -13,13 +13,13 @@ enum class ColourMap { viridis, jet };
 using ColourTable = std::array<cv::Vec3b, 256>;
 ColourTable colour_table(ColourMap map);
 
-/// Colour at a share of the scale; clamped to 0..1.
-cv::Vec3b colour_at(const ColourTable& table, double share);
+/// Colour at a fraction of the scale; clamped to 0..1.
+cv::Vec3b colour_at(const ColourTable& table, double fraction);
 
 /// What a colour bar says.
 struct ColourBar {
-  double least = 0;
-  double most = 1;
+  double min = 0;
+  double max = 1;
   std::string title;   ///< above the bar, with unit
   std::string note{};  ///< below the bar, may be empty
 };

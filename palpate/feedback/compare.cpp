@@ -12,8 +12,8 @@
 namespace palpate {
 namespace {
 
-constexpr double kLoadedShare = 0.05;  // of the true peak
-constexpr int kFramesToNotice = 2;     // at the beginning of a contact
+constexpr double kLoadedFraction = 0.05;  // of the true peak
+constexpr int kFramesToNotice = 2;        // at the beginning of a contact
 
 /// Truth and estimate of the same frame, side by side, ascending in frame.
 struct Pairing {
@@ -80,7 +80,7 @@ Pairing pair_up(const std::vector<ForceRow>& estimate, const std::vector<ForceRo
 
 /// Frames in which the force is worth judging.
 bool is_loaded(const Pairing& p, const Comparison& c, size_t i) {
-  return p.true_force[static_cast<Eigen::Index>(i)] > kLoadedShare * c.true_peak_N;
+  return p.true_force[static_cast<Eigen::Index>(i)] > kLoadedFraction * c.true_peak_N;
 }
 
 std::optional<double> correlation(const Eigen::ArrayXd& a, const Eigen::ArrayXd& b) {

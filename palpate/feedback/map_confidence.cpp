@@ -97,7 +97,7 @@ cv::Mat draw_map_confidence(const cv::Mat& left_bgr, const Rectification& rectif
       if (std::isfinite(deviations(px))) sorted.push_back(deviations(px));
     }
   std::sort(sorted.begin(), sorted.end());
-  const double most_mm = sorted.empty() ? 1 : std::max(0.05, static_cast<double>(sorted[sorted.size() * 49 / 50]));
+  const double max_mm = sorted.empty() ? 1 : std::max(0.05, static_cast<double>(sorted[sorted.size() * 49 / 50]));
 
   for (size_t i = 1; i < map.pieces.size(); ++i) {
     const VisibleTriangles other = seen_of(map.pieces[i].surface, rectification);
@@ -112,7 +112,7 @@ cv::Mat draw_map_confidence(const cv::Mat& left_bgr, const Rectification& rectif
       if (organ.triangle.at<int>(row, column) < 0) continue;
       const cv::Point px = organ.area.tl() + cv::Point(column, row);
       if (const float deviation = deviations(px); std::isfinite(deviation)) {
-        blend(image.at<cv::Vec3b>(px), colour_at(table, static_cast<double>(deviation) / most_mm));
+        blend(image.at<cv::Vec3b>(px), colour_at(table, static_cast<double>(deviation) / max_mm));
       } else if ((px.x + px.y) % 8 < 3) {
         blend(image.at<cv::Vec3b>(px), kContinued);
       }
@@ -125,7 +125,7 @@ cv::Mat draw_map_confidence(const cv::Mat& left_bgr, const Rectification& rectif
   draw_veil(image, {0, 0, text_width(title, text_px) + 24, cvRound(30 * scale)});
   draw_text(image, title, {12, cvRound(20 * scale)}, text_px, kInk);
   cv::Mat bar(image.rows, cvRound(kBarWidth_px * scale), CV_8UC3, cv::Scalar(32, 28, 26)), both;
-  draw_colour_bar(bar, {0, 0, bar.cols, std::min(bar.rows, cvRound(kBarHeight_px * scale))}, table, {0, most_mm, "mm"},
+  draw_colour_bar(bar, {0, 0, bar.cols, std::min(bar.rows, cvRound(kBarHeight_px * scale))}, table, {0, max_mm, "mm"},
                   scale);
   cv::hconcat(image, bar, both);
   return both;

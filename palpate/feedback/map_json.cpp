@@ -44,7 +44,7 @@ std::string map_json(const TissueMap& map, const Rectification& rectification) {
     }
     const Vec3& t = r.registration->left_from_volume_mm;
     json["registration"] = {{"residual_mm", r.registration->residual_mm},
-                            {"matched_share", r.registration->matched_share},
+                            {"matched_share", r.registration->matched_fraction},
                             {"left_from_volume", rotation},
                             {"left_from_volume_mm", {t.x(), t.y(), t.z()}}};
     json["times_ms"]["register"] = r.register_ms;

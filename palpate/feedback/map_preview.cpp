@@ -9,6 +9,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "palpate/core/quantile.h"
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/colour_map.h"
 #include "palpate/feedback/draw.h"
@@ -59,13 +60,13 @@ void for_each_mesh_pixel(cv::Mat& image, const VisibleTriangles& visible, const 
 void mark_fixed_nodes(cv::Mat& image, const VisibleTriangles& visible, const std::vector<ScreenVertex>& vertices,
                       const std::vector<int>& fixed_nodes) {
   const cv::Rect inside(0, 0, visible.area.width, visible.area.height);
-  float least = std::numeric_limits<float>::max(), most = -least;
+  float min = std::numeric_limits<float>::max(), max = -min;
   for (const ScreenVertex& v : vertices) {
     if (!std::isfinite(v.nearness)) continue;
-    least = std::min(least, v.nearness);
-    most = std::max(most, v.nearness);
+    min = std::min(min, v.nearness);
+    max = std::max(max, v.nearness);
   }
-  const float tolerance = 0.04f * (most - least);
+  const float tolerance = 0.04f * (max - min);
   for (const int node : fixed_nodes) {
     const ScreenVertex& v = vertices[static_cast<size_t>(node)];
     if (!std::isfinite(v.nearness)) continue;
@@ -117,13 +118,9 @@ std::pair<double, double> middle_range(const cv::Mat& values) {
     for (int x = 0; x < values.cols; ++x)
       if (std::isfinite(values.at<float>(y, x))) finite.push_back(values.at<float>(y, x));
   if (finite.empty()) return {0, 1};
-  const auto at_share = [&](double share) {
-    const auto place = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
-    std::nth_element(finite.begin(), place, finite.end());
-    return static_cast<double>(*place);
-  };
-  const double least = at_share(0.02), most = at_share(0.98);
-  return {least, std::max(most, least + 1e-3 * std::max(1.0, std::abs(least)))};
+  const double min = static_cast<double>(quantile_of(finite, 0.02)),
+               max = static_cast<double>(quantile_of(finite, 0.98));
+  return {min, std::max(max, min + 1e-3 * std::max(1.0, std::abs(min)))};
 }
 
 /// The rectified image in grey, coloured where there is a value; its colour bar at the right.
@@ -132,18 +129,17 @@ cv::Mat draw_value_panel(const cv::Mat& rectified_bgr, const cv::Mat& values, bo
   cv::Mat grey, image;
   cv::cvtColor(rectified_bgr, grey, cv::COLOR_BGR2GRAY);
   cv::cvtColor(grey * 0.5, image, cv::COLOR_GRAY2BGR);
-  auto [least, most] = middle_range(values);
-  if (from_zero) least = 0;
+  auto [min, max] = middle_range(values);
+  if (from_zero) min = 0;
   const ColourTable table = colour_table(ColourMap::viridis);
   for (int y = 0; y < values.rows; ++y)
     for (int x = 0; x < values.cols; ++x)
       if (const float value = values.at<float>(y, x); std::isfinite(value))
-        blend(image.at<cv::Vec3b>(y, x), colour_at(table, (value - least) / (most - least)), 0.85);
+        blend(image.at<cv::Vec3b>(y, x), colour_at(table, (value - min) / (max - min)), 0.85);
   cv::Mat panel = panel_of(image);
   draw_title(panel, title);
   cv::Mat bar(panel.rows, kBarWidth_px, CV_8UC3, kBackground), both;
-  draw_colour_bar(bar, {0, 0, kBarWidth_px, std::min(bar.rows, kBarHeight_px)}, table, {least, most, "mm"},
-                  kPanelScale);
+  draw_colour_bar(bar, {0, 0, kBarWidth_px, std::min(bar.rows, kBarHeight_px)}, table, {min, max, "mm"}, kPanelScale);
   cv::hconcat(panel, bar, both);
   return both;
 }
@@ -174,14 +170,14 @@ cv::Mat draw_side_panel(const TissueMap& map, const std::vector<Triangle>& bound
   cv::Mat panel(size, CV_8UC3, kBackground);
   const std::vector<Vec3>& nodes = map.mesh.nodes_mm;
   if (!nodes.empty()) {
-    Vec3 least = nodes.front(), most = nodes.front();
+    Vec3 min = nodes.front(), max = nodes.front();
     for (const Vec3& node : nodes) {
-      least = least.cwiseMin(node);
-      most = most.cwiseMax(node);
+      min = min.cwiseMin(node);
+      max = max.cwiseMax(node);
     }
     const cv::Rect plot(70, 50, size.width - 100, size.height - 100);
-    const double px_per_mm = std::min(plot.width / (most.z() - least.z()), plot.height / (most.y() - least.y())) * 0.92;
-    const Vec3 middle = 0.5 * (least + most);
+    const double px_per_mm = std::min(plot.width / (max.z() - min.z()), plot.height / (max.y() - min.y())) * 0.92;
+    const Vec3 middle = 0.5 * (min + max);
     const cv::Point2d centre = 0.5 * cv::Point2d(plot.tl() + plot.br());
     const auto x_of = [&](double z) { return centre.x + (z - middle.z()) * px_per_mm; };
     const auto y_of = [&](double y) { return centre.y + (y - middle.y()) * px_per_mm; };

@@ -25,9 +25,9 @@ const cv::Scalar kGood{110, 210, 90}, kIdle{190, 190, 190}, kDoubt{60, 180, 250}
 constexpr double kStrainOfLowestScale = 0.02;
 /// Share of the surface whose stress may lie above the scale: at the rim of the patch that the tip holds, stress grows
 /// without limit under refinement, and a scale that followed it would show nothing of the rest.
-constexpr double kShareAboveScale = 0.01;
+constexpr double kFractionAboveScale = 0.01;
 /// Share of the scale from which on stress has its full opacity.
-constexpr double kShareOfFullOpacity = 0.35;
+constexpr double kFractionOfFullOpacity = 0.35;
 
 struct Tint {
   float alpha = 0;
@@ -37,7 +37,7 @@ struct Tint {
 std::array<Tint, 256> tints_of(const ColourTable& colours, double opacity) {
   std::array<Tint, 256> tints;
   for (size_t i = 0; i < tints.size(); ++i) {
-    const double t = std::min(1.0, static_cast<double>(i) / 255 / kShareOfFullOpacity);
+    const double t = std::min(1.0, static_cast<double>(i) / 255 / kFractionOfFullOpacity);
     tints[i].alpha = static_cast<float>(opacity * t * t * (3 - 2 * t));
     tints[i].bgr = cv::Vec3f(colours[i][0], colours[i][1], colours[i][2]);
   }
@@ -100,7 +100,7 @@ double characteristic_stress_kPa(const ForceEstimate& e) {
   std::sort(stress_and_area.begin(), stress_and_area.end(), std::greater<>());
   double area_above = 0;
   for (const auto& [stress, area] : stress_and_area)
-    if ((area_above += area) >= kShareAboveScale * total_area) return stress;
+    if ((area_above += area) >= kFractionAboveScale * total_area) return stress;
   return 0;
 }
 
@@ -142,14 +142,14 @@ cv::Point clamped(const cv::Point& p, const cv::Rect& area) {
 void describe(Settings& settings, OverlayOptions& o) {
   settings.choice("region", o.region, {{"whole", OverlayRegion::whole}, {"around", OverlayRegion::around}},
                   "stress on the whole organ, or only around the instrument");
-  settings.number("radius_mm", o.radius_mm, {.least = 1, .most = 200}, "radius of region: around");
+  settings.number("radius_mm", o.radius_mm, {.min = 1, .max = 200}, "radius of region: around");
   settings.choice("colour_map", o.colour_map, {{"viridis", ColourMap::viridis}, {"jet", ColourMap::jet}},
                   "viridis: perceptually ordered; jet: as in the paper");
-  settings.number("opacity", o.opacity, {.least = 0, .most = 1}, "of the colour at the highest stress");
-  settings.number("stress_scale_kPa", o.stress_scale_kPa, {.least = 0, .most = 1e9},
+  settings.number("opacity", o.opacity, {.min = 0, .max = 1}, "of the colour at the highest stress");
+  settings.number("stress_scale_kPa", o.stress_scale_kPa, {.min = 0, .max = 1e9},
                   "end of the colour bar; 0 = follows the stress in round steps, never down");
   settings.flag("chart", o.chart, "draw the force over time");
-  settings.number("chart_duration_s", o.chart_duration_s, {.least = 1, .most = 600}, "time that the chart shows");
+  settings.number("chart_duration_s", o.chart_duration_s, {.min = 1, .max = 600}, "time that the chart shows");
 }
 
 OverlayPainter::OverlayPainter(const Rectification& rectification, const TissueOptions& tissue,
@@ -245,9 +245,9 @@ void OverlayPainter::paint_stress(cv::Mat& image, const ForceEstimate& estimate)
 /// The ends of a map that are too dark for lines and text are left out.
 cv::Scalar OverlayPainter::force_colour(const ForceEstimate& estimate) const {
   if (estimate.status == FrameStatus::map_stale || estimate.status == FrameStatus::not_converged) return kDoubt;
-  const double share = nodal_force_scale_N_ > 0 ? estimate.mean_nodal_force_N / nodal_force_scale_N_ : 0;
-  return options_.colour_map == ColourMap::jet ? colour_at(colours_, 0.35 + 0.5 * share)
-                                               : colour_at(colours_, 0.45 + 0.55 * share);
+  const double fraction = nodal_force_scale_N_ > 0 ? estimate.mean_nodal_force_N / nodal_force_scale_N_ : 0;
+  return options_.colour_map == ColourMap::jet ? colour_at(colours_, 0.35 + 0.5 * fraction)
+                                               : colour_at(colours_, 0.45 + 0.55 * fraction);
 }
 
 void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) const {
@@ -265,7 +265,7 @@ void OverlayPainter::draw_force(cv::Mat& image, const ForceEstimate& estimate) c
   }
 
   // As long in the image as it would be in space; along the line of sight a cross (away) or a dot (towards the camera).
-  const double length_px = (25 + 65 * force_N / chart_.most_N()) * scale;
+  const double length_px = (25 + 65 * force_N / chart_.max_N()) * scale;
   const double length_mm = length_px * estimate.tip_mm.z() / rectification_.focal_px;
   const Vec3 head_mm = estimate.tip_mm + estimate.force_N / force_N * length_mm;
   cv::Point2d head = head_mm.z() < 1 ? tip : project_to_recorded_left(rectification_.rig, head_mm);

@@ -10,10 +10,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 
+#include "palpate/core/quantile.h"
 #include "palpate/core/whole_file.h"
 #include "palpate/feedback/axis.h"
 #include "palpate/feedback/compare.h"
-#include "palpate/feedback/quantile.h"
 #include "palpate/feedback/report_page.h"
 #include "palpate/feedback/svg_chart.h"
 #include "palpate/feedback/warnings.h"
@@ -117,8 +117,8 @@ std::string cards(const Report& report, const std::optional<Comparison>& compari
   }
   std::vector<double> frame_ms;
   for (const ForceRow& row : report.rows) frame_ms.push_back(row.frame_ms);
-  html += card(fmt::format("{:.1f} ms", quantile(frame_ms, 0.5)),
-               fmt::format("per frame (median; 99 %: {:.1f} ms)", quantile(frame_ms, 0.99)));
+  html += card(fmt::format("{:.1f} ms", quantile_of(frame_ms, 0.5)),
+               fmt::format("per frame (median; 99 %: {:.1f} ms)", quantile_of(frame_ms, 0.99)));
   const bool has_ratio = peak_N > 0 && report.tissue.young_modulus_kPa > 0;
   const std::string ratio = has_ratio ? fmt::format("at the peak F/E = {} mm&sup2;; ",
                                                     three_digits(peak_N / report.tissue.young_modulus_MPa()))
@@ -212,7 +212,7 @@ std::string times_table(const std::vector<FrameTimes>& times) {
   std::string rows;
   const auto add = [&](const char* name, const std::vector<double>& ms) {
     rows += fmt::format("<tr><td>{}</td><td class=\"number\">{:.2f}</td><td class=\"number\">{:.2f}</td></tr>", name,
-                        quantile(ms, 0.5), quantile(ms, 0.99));
+                        quantile_of(ms, 0.5), quantile_of(ms, 0.99));
   };
   std::vector<double> ms(times.size());
   for (const auto& [name, stage] : stages) {

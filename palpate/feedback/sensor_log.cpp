@@ -19,14 +19,14 @@ namespace palpate {
 
 namespace {
 
-constexpr size_t kFewestReadings = 10;
+constexpr size_t kMinReadings = 10;
 /// The delay is searched in steps of the coarse one everywhere, around the best of those in steps of the fine one.
 constexpr double kCoarseStep_s = 0.02, kFineStep_s = 0.005;
 constexpr int kFineSteps = 6;
 /// Of the frames, as many have to lie within the sensor's time.
-constexpr double kLeastOverlap = 0.5;
+constexpr double kMinOverlap = 0.5;
 /// Below, the log shows something else than the video.
-constexpr double kLeastCorrelation = 0.5;
+constexpr double kMinCorrelation = 0.5;
 /// A rate that the file states and its stamps differ by no more than this, or the stamps hold.
 constexpr double kRateTolerance = 0.02;
 
@@ -66,7 +66,7 @@ std::vector<double> clock_of(const Table& table, double video_span_s) {
   const bool has_stamps = table.has("time_s") || table.has("stamp.secs");
   std::vector<double> stamps_s;
   if (has_stamps || !rate_Hz) stamps_s = times_s(table, {video_span_s});
-  if (!rate_Hz || table.rows().size() < kFewestReadings) return stamps_s;
+  if (!rate_Hz || table.rows().size() < kMinReadings) return stamps_s;
   std::vector<double> counted_s;
   for (const Table::Row& row : table.rows())
     counted_s.push_back(
@@ -129,11 +129,11 @@ double correlation_of(const Pairs& pairs) {
 
 double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor) {
   double best = 0, best_correlation = -2;
-  for (const double around_s : likely_delays_s(estimate, sensor, kLeastOverlap, kCoarseStep_s))
+  for (const double around_s : likely_delays_s(estimate, sensor, kMinOverlap, kCoarseStep_s))
     for (int step = -kFineSteps; step <= kFineSteps; ++step) {
       const double delay_s = around_s + step * kFineStep_s;
       const Pairs pairs = pairs_at(estimate, sensor, delay_s);
-      if (static_cast<double>(pairs.estimate_N.size()) < kLeastOverlap * static_cast<double>(estimate.size())) continue;
+      if (static_cast<double>(pairs.estimate_N.size()) < kMinOverlap * static_cast<double>(estimate.size())) continue;
       const double correlation = correlation_of(pairs);
       if (correlation <= best_correlation) continue;
       best_correlation = correlation;
@@ -168,9 +168,9 @@ std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, do
     of_same_time = 1;
     readings.push_back(reading);
   }
-  if (readings.size() < kFewestReadings)
+  if (readings.size() < kMinReadings)
     throw BadInput(fmt::format("{}: {} rows with a time of their own and three forces, expected at least {}; {}",
-                               file.string(), readings.size(), kFewestReadings, table.header_found()));
+                               file.string(), readings.size(), kMinReadings, table.header_found()));
   const double factor = newtons_per_value(table, readings);
   for (SensorReading& reading : readings) reading.force_N *= factor;
   return readings;
@@ -187,11 +187,11 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   result.camera_from_sensor = rotation_onto(pairs.sensor_N, pairs.estimate_N);
   result.frames = static_cast<int>(pairs.estimate_N.size());
   result.correlation = correlation_of(pairs);
-  if (result.correlation < kLeastCorrelation)
+  if (result.correlation < kMinCorrelation)
     throw BadInput(
         fmt::format("the sensor's log does not follow the estimate at any delay: the best is {:+.3f} s with a "
                     "correlation of {:.2f}, expected at least {:g}; is it the log of this recording?",
-                    result.delay_s, result.correlation, kLeastCorrelation));
+                    result.delay_s, result.correlation, kMinCorrelation));
   double along = 0, squared = 0;
   for (size_t i = 0; i < pairs.estimate_N.size(); ++i) {
     along += pairs.estimate_N[i].dot(result.camera_from_sensor * pairs.sensor_N[i]);

@@ -15,12 +15,12 @@ constexpr double kFirstMax_N = 0.1, kFirstMaxPerModulus = 0.001;
 }  // namespace
 
 StripChart::StripChart(double duration_s, std::string unit)
-    : duration_s_(duration_s), unit_(std::move(unit)), most_N_(unit_ == "N" ? kFirstMax_N : kFirstMaxPerModulus) {}
+    : duration_s_(duration_s), unit_(std::move(unit)), max_N_(unit_ == "N" ? kFirstMax_N : kFirstMaxPerModulus) {}
 
 void StripChart::add(double time_s, std::optional<double> force_N) {
   samples_.push_back({time_s, force_N});
   while (samples_.front().time_s < time_s - duration_s_) samples_.pop_front();
-  if (force_N && *force_N > 0) most_N_ = std::max(most_N_, round_up(1.05 * *force_N));
+  if (force_N && *force_N > 0) max_N_ = std::max(max_N_, round_up(1.05 * *force_N));
 }
 
 void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& colour, double scale) const {
@@ -32,8 +32,8 @@ void StripChart::draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& co
 
   const double first_s = samples_.empty() ? 0 : std::max(samples_.front().time_s, samples_.back().time_s - duration_s_);
   const auto x_of = [&](double time_s) { return plot.x + (time_s - first_s) / duration_s_ * plot.width; };
-  const auto y_of = [&](double force_N) { return plot.br().y - force_N / most_N_ * plot.height; };
-  for (const double tick : round_ticks(0, most_N_, static_cast<int>(plot.height / (2.5 * text_px)))) {
+  const auto y_of = [&](double force_N) { return plot.br().y - force_N / max_N_ * plot.height; };
+  for (const double tick : round_ticks(0, max_N_, static_cast<int>(plot.height / (2.5 * text_px)))) {
     const int y = cvRound(y_of(tick));
     cv::line(image, {plot.x, y}, {plot.br().x, y}, cv::Scalar::all(tick > 0 ? 90 : 190));
     draw_text(image, tick_text(tick), {plot.x - px(5), y + cvRound(text_px / 2)}, text_px, kInk, TextAnchor::right);

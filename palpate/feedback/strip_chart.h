@@ -18,7 +18,7 @@ class StripChart {
   void add(double time_s, std::optional<double> force_N);
 
   /// End of the axis of force, N.
-  double most_N() const { return most_N_; }
+  double max_N() const { return max_N_; }
 
   /// Draws the chart with axes, ticks and units on a dark veil in `area` of a BGR image; `colour` (BGR) is the curve's.
   void draw(cv::Mat& image, const cv::Rect& area, const cv::Scalar& colour, double scale) const;
@@ -31,7 +31,7 @@ class StripChart {
 
   double duration_s_;
   std::string unit_;
-  double most_N_;
+  double max_N_;
   std::deque<Sample> samples_;
 };
 

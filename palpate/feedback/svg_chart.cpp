@@ -14,20 +14,20 @@ namespace {
 constexpr int kLeft = 46, kRight = 12, kTop = 26, kBottom = 38, kLane = 20;
 
 struct Interval {
-  double least = std::numeric_limits<double>::max();
-  double most = std::numeric_limits<double>::lowest();
+  double min = std::numeric_limits<double>::max();
+  double max = std::numeric_limits<double>::lowest();
   void include(double value) {
     if (!std::isfinite(value)) return;
-    least = std::min(least, value);
-    most = std::max(most, value);
+    min = std::min(min, value);
+    max = std::max(max, value);
   }
-  bool empty() const { return most < least; }
+  bool empty() const { return max < min; }
 };
 
 /// Not empty and not a point.
 Interval widened(const Interval& interval) {
   if (interval.empty()) return {0, 1};
-  return {interval.least, interval.most - interval.least > 1e-9 ? interval.most : interval.least + 1};
+  return {interval.min, interval.max - interval.min > 1e-9 ? interval.max : interval.min + 1};
 }
 
 /// From time and value to the SVG's own pixels.
@@ -36,18 +36,14 @@ struct Frame {
   double value_step = 1;
   int width = 0, plot_bottom = 0;
 
-  double x(double t) const {
-    return kLeft + (t - time_s.least) / (time_s.most - time_s.least) * (width - kLeft - kRight);
-  }
-  double y(double v) const {
-    return plot_bottom - (v - value.least) / (value.most - value.least) * (plot_bottom - kTop);
-  }
+  double x(double t) const { return kLeft + (t - time_s.min) / (time_s.max - time_s.min) * (width - kLeft - kRight); }
+  double y(double v) const { return plot_bottom - (v - value.min) / (value.max - value.min) * (plot_bottom - kTop); }
 };
 
 /// All ticks of an interval whose ends are ticks.
 std::vector<double> ticks_of_step(const Interval& interval, double step) {
   std::vector<double> ticks;
-  for (double i = std::round(interval.least / step); i * step <= interval.most + 1e-9 * step; ++i)
+  for (double i = std::round(interval.min / step); i * step <= interval.max + 1e-9 * step; ++i)
     ticks.push_back(i * step);
   return ticks;
 }
@@ -61,7 +57,7 @@ std::string axes(const Frame& frame, const Chart& chart, int height) {
     svg += fmt::format("<text class=\"tick end\" x=\"{}\" y=\"{:.1f}\">{}</text>", kLeft - 6, frame.y(tick) + 4,
                        tick_text(tick));
   }
-  for (const double tick : round_ticks(frame.time_s.least, frame.time_s.most, std::max(4, frame.width / 110))) {
+  for (const double tick : round_ticks(frame.time_s.min, frame.time_s.max, std::max(4, frame.width / 110))) {
     svg += fmt::format("<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>", frame.x(tick),
                        frame.plot_bottom, frame.plot_bottom + 4);
     svg += fmt::format("<text class=\"tick middle\" x=\"{:.1f}\" y=\"{}\">{}</text>", frame.x(tick),
@@ -115,14 +111,14 @@ std::string svg_chart(const Chart& chart, int width_px, int height_px) {
   frame.time_s = widened(frame.time_s);
   frame.value = widened(frame.value);
   const int steps = std::max(2, (frame.plot_bottom - kTop) / 30);
-  frame.value_step = round_up((frame.value.most - frame.value.least) / steps);
-  frame.value.least = std::floor(frame.value.least / frame.value_step + 1e-9) * frame.value_step;
-  frame.value.most = std::ceil(frame.value.most / frame.value_step - 1e-9) * frame.value_step;
+  frame.value_step = round_up((frame.value.max - frame.value.min) / steps);
+  frame.value.min = std::floor(frame.value.min / frame.value_step + 1e-9) * frame.value_step;
+  frame.value.max = std::ceil(frame.value.max / frame.value_step - 1e-9) * frame.value_step;
 
   std::string svg = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"{2} over time\" "
       "data-from-s=\"{3}\" data-to-s=\"{4}\" data-left=\"{5}\" data-right=\"{6}\">",
-      width_px, height_px, chart.value_title, frame.time_s.least, frame.time_s.most, kLeft, width_px - kRight);
+      width_px, height_px, chart.value_title, frame.time_s.min, frame.time_s.max, kLeft, width_px - kRight);
   svg += axes(frame, chart, height_px);
   for (const ChartSeries& series : chart.series) svg += curve(frame, series);
   int top = frame.plot_bottom + 24;

@@ -4,6 +4,8 @@
 
 #include "palpate/infer/filter_state.h"
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 void FilterState::report(size_t instrument, const ContactFit& fit, const TipObservation& tip,
@@ -51,9 +53,7 @@ double FilterState::misfit_mm(const FrameData& data, const Belief& at, bool& exp
   explained = rows.size() < 10 ||
               static_cast<double>(unexplained) < parameters.unexplained_ratio * static_cast<double>(rows.size());
   if (misfits.empty()) return 0;
-  const auto middle = misfits.begin() + static_cast<std::ptrdiff_t>(misfits.size() / 2);
-  std::nth_element(misfits.begin(), middle, misfits.end());
-  return *middle;
+  return median_of(misfits);
 }
 
 }  // namespace palpate

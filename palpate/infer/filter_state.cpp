@@ -35,7 +35,7 @@ FilterState::FilterState(ContactModel m, const AttachedMesh& map, std::vector<Ti
   even_points = spread_evenly(points, static_cast<size_t>(parameters.even_points));
   if (options.drive == Drive::tip) parameters.log_radius_walk = 0;  // the radius is the one stated
   belief = initial_belief(parameters);
-  for (size_t i = 0; i < kMostInstruments; ++i) hands.emplace_back(options.grip);
+  for (size_t i = 0; i < kMaxInstruments; ++i) hands.emplace_back(options.grip);
 }
 
 FitContext FilterState::context() const {

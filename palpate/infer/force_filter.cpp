@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-static_assert(Unknowns::kScene + kMostInstruments * Unknowns::kContact <= kMaxUnknowns);
+static_assert(Unknowns::kScene + kMaxInstruments * Unknowns::kContact <= kMaxUnknowns);
 
 ForceFilter::ForceFilter(ContactModel model, const AttachedMesh& map, std::vector<TissuePoint> points,
                          const Rectification& rectification, const ContactOptions& contact,

@@ -53,7 +53,7 @@ struct InstrumentAnswer {
 };
 
 struct FrameAnswer {
-  std::array<InstrumentAnswer, kMostInstruments> instruments;
+  std::array<InstrumentAnswer, kMaxInstruments> instruments;
   SceneMotion scene;
   bool explained = true;  ///< some hypothesis explains the tissue that is seen
   /// The body under all contacts; empty where nothing touches.

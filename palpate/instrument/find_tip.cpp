@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
@@ -33,11 +35,11 @@ struct Picture {
   }
 };
 
-constexpr int kLeastPixels = 60;
-constexpr double kApartWidths = 2;    // between the places where two shafts enter
-constexpr double kShaftShare = 0.5;   // of the full width that a slice of the shaft has
-constexpr double kSleeveShare = 0.8;  // the same where a thin rod comes out of a sleeve
-constexpr double kSolid = 0.85;       // share of a slice of the shaft that belongs to the mask
+constexpr int kMinPixels = 60;
+constexpr double kApartWidths = 2;       // between the places where two shafts enter
+constexpr double kShaftFraction = 0.5;   // of the full width that a slice of the shaft has
+constexpr double kSleeveFraction = 0.8;  // the same where a thin rod comes out of a sleeve
+constexpr double kSolid = 0.85;          // fraction of a slice of the shaft that belongs to the mask
 /// What a part may look like, to be an instrument.
 struct ShaftShape {
   double straight;  ///< most deviation of the edges from straight lines, in widths
@@ -49,13 +51,6 @@ constexpr ShaftShape kByColours{0.09, 0.45};  // of a mask that nothing but colo
 constexpr double kGapWidths = 3;    // between the border and what is seen of an instrument whose shaft is too dark
 constexpr double kGapLength = 1.8;  // of such a part, in its widths
 constexpr double kRearEnd = 0.06;   // of its length
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Pixels of the box that lie within two of the border of the image.
 cv::Mat image_border(const cv::Size& size, const cv::Rect& box) {
@@ -78,18 +73,18 @@ bool touches(const std::vector<cv::Point>& pixels, const cv::Mat& border) {
 
 std::vector<Slice> slices_along(const std::vector<cv::Point>& pixels, const cv::Mat& border, const cv::Point2d& origin,
                                 const cv::Point2d& axis, double& first) {
-  double least = 1e9, most = -1e9;
+  double min = 1e9, max = -1e9;
   for (const cv::Point& p : pixels) {
     const double s = (p.x - origin.x) * axis.x + (p.y - origin.y) * axis.y;
-    least = std::min(least, s);
-    most = std::max(most, s);
+    min = std::min(min, s);
+    max = std::max(max, s);
   }
-  first = least;
-  std::vector<Slice> slices(static_cast<size_t>(most - least) + 1);
+  first = min;
+  std::vector<Slice> slices(static_cast<size_t>(max - min) + 1);
   for (const cv::Point& p : pixels) {
     const double s = (p.x - origin.x) * axis.x + (p.y - origin.y) * axis.y;
     const double t = (p.y - origin.y) * axis.x - (p.x - origin.x) * axis.y;
-    Slice& slice = slices[static_cast<size_t>(s - least)];
+    Slice& slice = slices[static_cast<size_t>(s - min)];
     slice.low = std::min(slice.low, t);
     slice.high = std::max(slice.high, t);
     ++slice.pixels;
@@ -126,23 +121,22 @@ struct Shaft {
   EdgeLine low, high;
   double width = 0;
   int slices = 0;
-  double filled = 0;  ///< share of the pixels between the edges that belong to the mask
+  double filled = 0;  ///< fraction of the pixels between the edges that belong to the mask
 };
 
-Shaft fit_shaft(const std::vector<Slice>& slices, double least_share) {
+Shaft fit_shaft(const std::vector<Slice>& slices, double min_fraction) {
   Shaft shaft;
   std::vector<double> widths;
   for (const Slice& slice : slices)
     if (slice.pixels > 0 && !slice.cut) widths.push_back(std::min(slice.width(), 1.0 * slice.pixels));
   if (widths.size() < 8) return shaft;
-  std::nth_element(widths.begin(), widths.begin() + static_cast<std::ptrdiff_t>(widths.size() * 3 / 4), widths.end());
-  const double full_width = widths[widths.size() * 3 / 4];
+  const double full_width = quantile_of(widths, 0.75);
 
   std::vector<double> s, low, high, width;
   double area = 0, pixels = 0;
   for (size_t i = 0; i < slices.size(); ++i) {
     const Slice& slice = slices[i];
-    if (slice.pixels == 0 || slice.cut || slice.width() < least_share * full_width) continue;
+    if (slice.pixels == 0 || slice.cut || slice.width() < min_fraction * full_width) continue;
     area += slice.width();
     pixels += slice.pixels;
     if (slice.pixels < kSolid * slice.width()) continue;  // between open jaws
@@ -180,9 +174,9 @@ bool has_rod(const std::vector<Slice>& slices, const Shaft& sleeve) {
     if (slice.low < sleeve.low.offset + sleeve.low.slope * at - margin ||
         slice.high > sleeve.high.offset + sleeve.high.slope * at + margin)
       return false;
-    if (slice.width() >= kSleeveShare * sleeve.width) {
+    if (slice.width() >= kSleeveFraction * sleeve.width) {
       last_of_sleeve = at;
-    } else if (slice.width() >= kShaftShare * sleeve.width) {
+    } else if (slice.width() >= kShaftFraction * sleeve.width) {
       s.push_back(at), low.push_back(slice.low), high.push_back(slice.high);
     }
   }
@@ -193,11 +187,11 @@ bool has_rod(const std::vector<Slice>& slices, const Shaft& sleeve) {
 /// The far end in coordinates along and across the axis.
 cv::Point2d far_end(const std::vector<Slice>& slices, double first, double width) {
   // An end that is only a pixel or two thick is noise of the mask: the tip begins where the slices carry a jaw.
-  const double least_pixels = std::max(2.0, 0.06 * width);
+  const double min_pixels = std::max(2.0, 0.06 * width);
   size_t last = slices.size() - 1;
-  while (last > 0 && slices[last].pixels < least_pixels) --last;
+  while (last > 0 && slices[last].pixels < min_pixels) --last;
   double beyond = 0;  // the partly filled slice before the first full one, for sub-pixel precision
-  if (last + 1 < slices.size()) beyond = std::min(1.0, slices[last + 1].pixels / least_pixels);
+  if (last + 1 < slices.size()) beyond = std::min(1.0, slices[last + 1].pixels / min_pixels);
   double across = 0, weight = 0;
   const size_t depth = static_cast<size_t>(std::max(3.0, 0.15 * width));
   for (size_t i = last; i + depth > last && i > 0; --i) {
@@ -247,19 +241,19 @@ std::vector<cv::Point> rear_end(const std::vector<cv::Point>& pixels, const cv::
   }
   const double angle = 0.5 * std::atan2(2 * spread(0, 1), spread(0, 0) - spread(1, 1));
   const cv::Point2d axis(std::cos(angle), std::sin(angle));
-  double least = 1e9, most = -1e9;
+  double min = 1e9, max = -1e9;
   for (const cv::Point& p : pixels) {
     const double s = (cv::Point2d(p) - centre).dot(axis);
-    least = std::min(least, s), most = std::max(most, s);
+    min = std::min(min, s), max = std::max(max, s);
   }
-  const double length = most - least, width = static_cast<double>(pixels.size()) / std::max(1.0, length);
+  const double length = max - min, width = static_cast<double>(pixels.size()) / std::max(1.0, length);
   const cv::Point2d from = centre + cv::Point2d(origin);
-  const double behind = way_to_border_px(picture, from + least * axis, -axis);
-  const double ahead = way_to_border_px(picture, from + most * axis, axis);
+  const double behind = way_to_border_px(picture, from + min * axis, -axis);
+  const double ahead = way_to_border_px(picture, from + max * axis, axis);
   if (length < kGapLength * width || std::min(behind, ahead) > kGapWidths * width) return {};
   std::vector<cv::Point> end;
   for (const cv::Point& p : pixels) {
-    const double s = (cv::Point2d(p) - centre).dot(axis), from_end = behind <= ahead ? s - least : most - s;
+    const double s = (cv::Point2d(p) - centre).dot(axis), from_end = behind <= ahead ? s - min : max - s;
     if (from_end <= kRearEnd * length) end.push_back(p);
   }
   return end;
@@ -291,7 +285,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   std::vector<Slice> slices;
   for (int pass = 0; pass < 3; ++pass) {
     slices = slices_along(pixels, border, entry, axis, first);
-    shaft = fit_shaft(slices, kShaftShare);
+    shaft = fit_shaft(slices, kShaftFraction);
     if (shaft.slices == 0) return {};
     if (pass == 2) break;
     const double turn = std::atan(0.5 * (shaft.low.slope + shaft.high.slope));
@@ -300,7 +294,7 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   }
   const ShaftShape& strict = shape.straight < kShaft.straight ? shape : kShaft;
   if (!looks_like_an_instrument(shaft, farthest, strict)) {
-    const Shaft sleeve = fit_shaft(slices, kSleeveShare);
+    const Shaft sleeve = fit_shaft(slices, kSleeveFraction);
     if (has_rod(slices, sleeve) && looks_like_an_instrument(sleeve, farthest, strict)) shaft = sleeve;
   }
   if (!looks_like_an_instrument(shaft, farthest, shape) || at_two_places(entering, shaft.width)) return {};
@@ -313,21 +307,21 @@ std::optional<ImageTip> tip_of_component(const std::vector<cv::Point>& pixels, c
   return tip;
 }
 
-std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t most,
+std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t max,
                                             const ShaftShape& shape) {
   std::vector<ImageInstrument> found;
   const cv::Rect box = cv::boundingRect(instrument_mask);
-  if (box.area() < kLeastPixels) return found;
+  if (box.area() < kMinPixels) return found;
   const cv::Mat border = image_border(instrument_mask.size(), box);
   cv::Mat labels, stats, centres;
   const int count = cv::connectedComponentsWithStats(instrument_mask(box), labels, stats, centres, 8);
   std::vector<int> by_size;
   for (int i = 1; i < count; ++i)
-    if (stats.at<int>(i, cv::CC_STAT_AREA) >= kLeastPixels) by_size.push_back(i);
+    if (stats.at<int>(i, cv::CC_STAT_AREA) >= kMinPixels) by_size.push_back(i);
   std::sort(by_size.begin(), by_size.end(),
             [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
   for (int label : by_size) {
-    if (found.size() == most) break;
+    if (found.size() == max) break;
     std::vector<cv::Point> pixels;
     const cv::Mat part = labels == label;
     cv::findNonZero(part, pixels);
@@ -343,9 +337,8 @@ std::vector<ImageInstrument> instruments_in(const cv::Mat& instrument_mask, cons
 
 }  // namespace
 
-std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area,
-                                              size_t most) {
-  return instruments_in(instrument_mask, picture_area, most, kVetted);
+std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area, size_t max) {
+  return instruments_in(instrument_mask, picture_area, max, kVetted);
 }
 
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area) {

@@ -26,7 +26,7 @@ struct ImageInstrument {
 /// that touch each other enter at two places and are none. `picture_area` (255 inside, may be empty) says where the
 /// picture ends when it does not fill the image.
 std::vector<ImageInstrument> find_instruments(const cv::Mat& instrument_mask, const cv::Mat& picture_area = {},
-                                              size_t most = 4);
+                                              size_t max = 4);
 
 /// The tip of the largest instrument in the mask, if there is any.
 std::optional<ImageTip> find_tip(const cv::Mat& instrument_mask, const cv::Mat& picture_area = {});

@@ -12,7 +12,7 @@ constexpr int kReduced = 4;              // times smaller is the image on which 
 constexpr double kNeighbourhood = 0.02;  // of the image's width, radius
 constexpr float kNoise = 0.03F;          // of the square root of a colour from 0 to 1, that makes no edge
 constexpr double kNear = 0.012;          // of the image's width, in which the picture decides
-constexpr float kLeastProbability = 0.1F;
+constexpr float kMinProbability = 0.1F;
 
 /// Colours whose noise is about the same in the dark and in the light.
 cv::Mat guide_of(const cv::Mat& bgr) {
@@ -64,7 +64,7 @@ cv::Mat local_functions(const cv::Mat& guide, const cv::Mat& target, int radius)
 
 /// The part of the image in which anything is likely, with a margin.
 cv::Rect likely_part(const cv::Mat& probability, cv::Size image, int margin) {
-  const cv::Rect box = cv::boundingRect(cv::Mat(probability > kLeastProbability));
+  const cv::Rect box = cv::boundingRect(cv::Mat(probability > kMinProbability));
   if (box.area() == 0) return {};
   const double x = 1.0 * image.width / probability.cols, y = 1.0 * image.height / probability.rows;
   const cv::Point from(static_cast<int>(box.x * x) - margin, static_cast<int>(box.y * y) - margin);

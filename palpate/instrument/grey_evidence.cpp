@@ -4,6 +4,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 namespace {
 
@@ -35,9 +37,7 @@ cv::Mat grey_counted_in(const cv::Mat& bgr, const cv::Mat& probability) {
     }
   cv::Mat evidence = cv::Mat::zeros(bgr.size(), CV_32F), odds, result;
   if (!lit.empty()) {
-    const auto at = lit.begin() + static_cast<std::ptrdiff_t>(kOfPicture * static_cast<double>(lit.size() - 1));
-    std::nth_element(lit.begin(), at, lit.end());
-    const float of_tissue = std::clamp(*at, kPalest, kReddest);
+    const float of_tissue = std::clamp(quantile_of(lit, kOfPicture), kPalest, kReddest);
     for (int y = 0; y < bgr.rows; ++y)
       for (int x = 0; x < bgr.cols; ++x)
         if (const float r = redness.at<float>(y, x); r >= 0)

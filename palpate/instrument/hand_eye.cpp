@@ -11,6 +11,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/core/kabsch.h"
+#include "palpate/core/quantile.h"
 
 namespace palpate {
 
@@ -18,18 +19,18 @@ namespace {
 
 constexpr double kLongestGap_s = 0.1;
 constexpr double kNotARotation = 1e-3;
-constexpr size_t kFewestFrames = 20;
+constexpr size_t kMinFrames = 20;
 /// Of the frames in which a tip was seen, as many have to lie within the track's time.
-constexpr double kLeastOverlap = 0.5;
+constexpr double kMinOverlap = 0.5;
 /// The delay is searched in steps of the first, then around the best in steps of the second.
 constexpr double kCoarseStep_s = 0.02, kFineStep_s = 0.001;
 /// Frames farther off than this many times the median, and than a good measurement, do not fit.
-constexpr double kMostMedians = 3, kGood_mm = 0.5;
+constexpr double kMaxMedians = 3, kGood_mm = 0.5;
 constexpr int kFits = 4;
 /// Errors of a tip that is followed stay for about so many frames.
 constexpr double kAlikeFrames = 10;
 /// How far the tip has to move, RMS: at all, and across the line that it follows most.
-constexpr double kLeastMotion_mm = 3, kLeastSpread_mm = 0.7;
+constexpr double kMinMotion_mm = 3, kMinSpread_mm = 0.7;
 
 struct Pair {
   Vec3 seen_mm, track_mm;
@@ -62,9 +63,7 @@ CameraFromRobot fit(const std::vector<Pair>& pairs) {
 double median_distance_mm(const std::vector<Pair>& pairs, const CameraFromRobot& camera_from_robot) {
   std::vector<double> distances;
   for (const Pair& pair : pairs) distances.push_back((pair.seen_mm - camera_from_robot(pair.track_mm)).norm());
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median_of(distances);
 }
 
 /// The pairs that fit, and the motion that they agree on.
@@ -77,11 +76,10 @@ struct Agreement {
 Agreement agree(const std::vector<Pair>& all) {
   Agreement agreement{all, fit(all)};
   for (int i = 1; i < kFits; ++i) {
-    const double most_mm = std::max(kGood_mm, kMostMedians * median_distance_mm(all, agreement.camera_from_robot));
+    const double max_mm = std::max(kGood_mm, kMaxMedians * median_distance_mm(all, agreement.camera_from_robot));
     agreement.pairs.clear();
     for (const Pair& pair : all)
-      if ((pair.seen_mm - agreement.camera_from_robot(pair.track_mm)).norm() <= most_mm)
-        agreement.pairs.push_back(pair);
+      if ((pair.seen_mm - agreement.camera_from_robot(pair.track_mm)).norm() <= max_mm) agreement.pairs.push_back(pair);
     agreement.camera_from_robot = fit(agreement.pairs);
   }
   double squared = 0;
@@ -101,7 +99,7 @@ Delay best_delay(const std::vector<SeenTip>& seen, const TipTrack& track, double
   Delay best;
   for (double offset_s = first_s; offset_s <= last_s + 1e-9; offset_s += step_s) {
     const std::vector<Pair> pairs = pairs_at(seen, track, offset_s);
-    if (static_cast<double>(pairs.size()) < kLeastOverlap * static_cast<double>(seen.size())) continue;
+    if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(seen.size())) continue;
     const double median_mm = median_distance_mm(pairs, agree(pairs).camera_from_robot);
     if (median_mm < best.median_mm) best = {offset_s, median_mm};
   }
@@ -148,9 +146,9 @@ std::optional<TipTrack::Row> row_at(const TipTrack& track, double track_time_s) 
 }
 
 HandEye estimate_hand_eye(const std::vector<SeenTip>& seen, const TipTrack& track) {
-  if (seen.size() < kFewestFrames)
+  if (seen.size() < kMinFrames)
     throw BadInput(fmt::format("the video shows the tip in {} frames, expected at least {} to place a track by",
-                               seen.size(), kFewestFrames));
+                               seen.size(), kMinFrames));
   const double track_begins_s = track.rows.begin()->second.time_s, track_ends_s = track.rows.rbegin()->second.time_s;
   const Delay coarse =
       best_delay(seen, track, track_begins_s - seen.back().time_s, track_ends_s - seen.front().time_s, kCoarseStep_s);
@@ -160,14 +158,14 @@ HandEye estimate_hand_eye(const std::vector<SeenTip>& seen, const TipTrack& trac
       best_delay(seen, track, coarse.offset_s - kCoarseStep_s, coarse.offset_s + kCoarseStep_s, kFineStep_s);
   const Agreement agreement = agree(pairs_at(seen, track, fine.offset_s));
   const Vec3 spread = spreads_mm(agreement.pairs);
-  if (spread[2] < kLeastMotion_mm)
+  if (spread[2] < kMinMotion_mm)
     throw BadInput(fmt::format("the tip moves by {:.1f} mm RMS, expected at least {:g} mm to place a track by",
-                               spread[2], kLeastMotion_mm));
-  if (spread[1] < kLeastSpread_mm)
+                               spread[2], kMinMotion_mm));
+  if (spread[1] < kMinSpread_mm)
     throw BadInput(
         fmt::format("the tip moves along a line ({:.1f} mm RMS beside it, expected at least {:g} mm): the "
                     "rotation about it cannot be told",
-                    spread[1], kLeastSpread_mm));
+                    spread[1], kMinSpread_mm));
   HandEye result;
   result.camera_from_robot = agreement.camera_from_robot;
   result.time_offset_s = fine.offset_s;

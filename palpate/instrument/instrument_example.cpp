@@ -11,7 +11,7 @@ constexpr int kBins = 16;           // of each of brightness and two ratios
 constexpr int kLearntWidth = 320;   // px of the image that is learnt from
 constexpr int kIterations = 4;      // of the cut between instrument and tissue
 constexpr float kFrequent = 3e-4F;  // below this frequency a colour says little
-constexpr float kMostEvidence = 3;  // of one colour, so that the network can overrule it
+constexpr float kMaxEvidence = 3;   // of one colour, so that the network can overrule it
 
 int bin_of(const cv::Vec3b& p) {
   const float b = p[0] + 8.0F, g = p[1] + 8.0F, r = p[2] + 8.0F;
@@ -77,7 +77,7 @@ ExampleColours ExampleColours::of_found(const cv::Mat& bgr, const cv::Mat& instr
   ExampleColours found;
   const cv::Mat with = frequencies(bgr, instrument) + kFrequent, without = frequencies(bgr, ~instrument) + kFrequent;
   cv::log(with / without, found.evidence_);
-  found.evidence_ = cv::max(cv::min(found.evidence_, kMostEvidence), -kMostEvidence);
+  found.evidence_ = cv::max(cv::min(found.evidence_, kMaxEvidence), -kMaxEvidence);
   return found;
 }
 

@@ -18,10 +18,10 @@ constexpr LayerNoise kNoise{30, 24};
 constexpr double kSlopeDeviation = 0.05;  // px/px along the axis; a shaft that halves its depth over the image has 0.05
 constexpr double kSlopeAcross = 0.01;     // the outline of a round shaft lies square to the line of sight
 constexpr double kSlopeChange = 0.003;    // from frame to frame
-constexpr double kRowFloor_px = 0.06;     // of an outline, which light moves differently in both eyes
-constexpr size_t kFewestMatches = 60;
-constexpr double kLeastDisparity_px = 2, kMostDisparity_px = 200;
-constexpr double kLeastAgreement = 0.35;
+constexpr double kRowFloor_px = 0.06;     // of an outline, which light moves differently in both cameras
+constexpr size_t kMinMatches = 60;
+constexpr double kMinDisparity_px = 2, kMaxDisparity_px = 200;
+constexpr double kMinAgreement = 0.35;
 constexpr double kCorrelatedNoise = 12;  // pixels that share one noise sample after smoothing and video coding
 
 struct System {
@@ -100,8 +100,8 @@ Expected expected_plane(const ImageTip& tip, const PlanePrior& prior) {
 
 RowOffset measure_row_offset(const cv::Mat& left_bgr, const cv::Mat& right_bgr) {
   const cv::Mat everywhere(left_bgr.size(), CV_8U, cv::Scalar(255));
-  const Seeds seeds = find_seeds(prepare_eyes(left_bgr, right_bgr, everywhere), kLeastDisparity_px, kMostDisparity_px);
-  if (seeds.matches.size() < kFewestMatches) return {};
+  const Seeds seeds = find_seeds(prepare_pair(left_bgr, right_bgr, everywhere), kMinDisparity_px, kMaxDisparity_px);
+  if (seeds.matches.size() < kMinMatches) return {};
   return {seeds.row_offset_px, std::hypot(kRowFloor_px, seeds.calibration_deviation_px)};
 }
 
@@ -122,7 +122,7 @@ std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const
       if (std::abs(step[0]) < 0.003 && std::abs(step[3]) < 0.003) break;
     }
   }
-  if (system.agreement() < kLeastAgreement || !(p[0] > 0.5)) return {};
+  if (system.agreement() < kMinAgreement || !(p[0] > 0.5)) return {};
   InstrumentPlane plane;
   plane.origin_px = tip.tip_px;
   plane.disparity = p.head<3>();

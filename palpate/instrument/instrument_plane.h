@@ -13,7 +13,7 @@ struct InstrumentPlane {
   Eigen::Vector3d disparity = Eigen::Vector3d::Zero();  ///< at the origin, px; its slope in x and in y, px/px
   double row_offset_px = 0;                             ///< right row minus left row
   double disparity_deviation_px = 0;                    ///< of the disparity at the origin
-  double agreement = 0;                                 ///< share of the template's gradients that fit, 0..1
+  double agreement = 0;                                 ///< fraction of the template's gradients that fit, 0..1
 
   double disparity_at(const cv::Point2d& left_px) const {
     return disparity[0] + disparity[1] * (left_px.x - origin_px.x) + disparity[2] * (left_px.y - origin_px.y);

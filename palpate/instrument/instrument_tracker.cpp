@@ -24,16 +24,16 @@ constexpr int kBeforeASecondIsBelieved = 3;
 constexpr double kSameDirection = 0.5;  // cosine between shafts of one instrument that left and came back
 constexpr double kFarthest_px = 120;    // between where a tip is expected and where it is, if its shaft has turned
 constexpr double kTurnedShaft = 0.7;    // cosine
-constexpr double kNotSeen_px = 1000;    // what it costs that an eye does not show an instrument
-constexpr double kNotOneTip_px = 600;   // and that the eyes show what cannot be one tip
+constexpr double kNotSeen_px = 1000;    // what it costs that an camera does not show an instrument
+constexpr double kNotOneTip_px = 600;   // and that the cameras show what cannot be one tip
 constexpr double kNever_px = 1e6;
-constexpr double kTouchingShare = 0.5;  // of the expected end of the shaft that lies on another's mask
+constexpr double kTouchingFraction = 0.5;  // of the expected end of the shaft that lies on another's mask
 
-/// One eye in one frame.
-struct SeenByEye {
+/// One camera in one frame.
+struct SeenByCamera {
   FoundInstruments found;
   std::vector<ImageInstrument> instruments;
-  std::array<int, kMostInstruments> of_tracker;  ///< which of `instruments`, or -1
+  std::array<int, kMaxInstruments> of_tracker;  ///< which of `instruments`, or -1
 };
 
 /// An outline as it is; around a point, a small square.
@@ -44,7 +44,7 @@ std::vector<cv::Point2d> around(const std::vector<cv::Point2d>& example_px) {
   return {p - x - y, p + x - y, p + x + y, p - x + y};
 }
 
-/// Which instrument of each eye, or -1.
+/// Which instrument of each camera, or -1.
 using Assigned = std::array<int, 2>;
 
 /// Between where a tip is expected and where one is.
@@ -54,14 +54,14 @@ double away_from(const ImageTip& expected, const ImageTip& tip) {
   return distance_px + kFarthest_px * (1 - cosine);
 }
 
-/// How badly the tips of two eyes go together, though they can be one.
+/// How badly the tips of two cameras go together, though they can be one.
 double misfit(const ImageTip& left, const ImageTip& right) {
   const double rows = std::abs(left.tip_px.y - right.tip_px.y) / (4 + 0.15 * left.width_px);
   return rows + 4 * (1 - left.axis.dot(right.axis)) + std::abs(std::log(left.width_px / right.width_px));
 }
 
 /// Share of the end of a shaft, where it is expected, that lies on a mask whose corner is at `origin`.
-double share_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& expected) {
+double fraction_on(const cv::Mat& mask, const cv::Point& origin, const ImageTip& expected) {
   int on = 0;
   constexpr int kSteps = 8;
   for (int i = 1; i <= kSteps; ++i) {
@@ -78,24 +78,24 @@ struct InstrumentTracker::State {
   cv::Mat example;  ///< 255 in the rectified left image of the example's frame; may be empty
   int example_frame = 0;
   RowOffset rows;
-  std::vector<InstrumentFinder> finders;  ///< one for each eye
+  std::vector<InstrumentFinder> finders;  ///< one for each camera
   WayChoice way;
   std::vector<TipTrack> tracks;
   std::function<std::optional<TipTrack::Row>()> live_tip;
   double time_offset_s = 0;
   std::vector<TipTracker> trackers;
-  std::array<int, kMostInstruments> frames_seen{};
+  std::array<int, kMaxInstruments> frames_seen{};
   int second_seen = 0;  ///< frames, one after the other, in which a further instrument asked for an entry
   std::optional<double> last_time_s;
 
   std::optional<TipTrack::Row> row_of(const TipTrack& track, const RectifiedPair& pair) const;
   std::array<FoundInstruments, 2> find(const RectifiedPair& pair);
-  std::optional<ImageTip> expected(size_t tracker, size_t eye, double seconds) const;
-  void follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const;
-  std::array<bool, kMostInstruments> part_touching(std::array<SeenByEye, 2>& seen, double seconds) const;
-  void begin_further(std::array<SeenByEye, 2>& seen);
-  std::optional<size_t> entry_for(const ImageTip& left, const SeenByEye& seen_left) const;
-  EyeView view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye, double seconds) const;
+  std::optional<ImageTip> expected(size_t tracker, size_t camera, double seconds) const;
+  void follow_visible(std::array<SeenByCamera, 2>& seen, double seconds) const;
+  std::array<bool, kMaxInstruments> part_touching(std::array<SeenByCamera, 2>& seen, double seconds) const;
+  void begin_further(std::array<SeenByCamera, 2>& seen);
+  std::optional<size_t> entry_for(const ImageTip& left, const SeenByCamera& seen_left) const;
+  CameraView view(const cv::Mat& bgr, const SeenByCamera& seen, size_t tracker, size_t camera, double seconds) const;
   bool keeps_its_entry(size_t tracker) const {
     return trackers[tracker].marked() || frames_seen[tracker] >= kKeepsItsEntryAfter;
   }
@@ -119,37 +119,37 @@ std::array<FoundInstruments, 2> InstrumentTracker::State::find(const RectifiedPa
   return found;
 }
 
-std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_t eye, double seconds) const {
-  std::optional<ImageTip> tip = trackers[tracker].last_tip(eye);
-  if (tip && trackers[tracker].visible()) tip->tip_px = trackers[tracker].expected_px(eye, seconds);
+std::optional<ImageTip> InstrumentTracker::State::expected(size_t tracker, size_t camera, double seconds) const {
+  std::optional<ImageTip> tip = trackers[tracker].last_tip(camera);
+  if (tip && trackers[tracker].visible()) tip->tip_px = trackers[tracker].expected_px(camera, seconds);
   return tip;
 }
 
-/// Gives every visible instrument one of each eye's, all at once: near to where it is expected, and the same one in
-/// both eyes.
-void InstrumentTracker::State::follow_visible(std::array<SeenByEye, 2>& seen, double seconds) const {
-  std::array<Assigned, kMostInstruments> best;
-  std::array<std::array<std::vector<double>, 2>, kMostInstruments> away_px;  // by tracker, eye, instrument
-  for (size_t t = 0; t < kMostInstruments; ++t)
-    for (size_t eye = 0; eye < 2; ++eye) {
-      const auto tip = trackers[t].visible() ? expected(t, eye, seconds) : std::nullopt;
-      for (const ImageInstrument& candidate : seen[eye].instruments)
-        away_px[t][eye].push_back(tip ? away_from(*tip, candidate.tip) : kNever_px);
+/// Gives every visible instrument one of each camera's, all at once: near to where it is expected, and the same one in
+/// both cameras.
+void InstrumentTracker::State::follow_visible(std::array<SeenByCamera, 2>& seen, double seconds) const {
+  std::array<Assigned, kMaxInstruments> best;
+  std::array<std::array<std::vector<double>, 2>, kMaxInstruments> away_px;  // by tracker, camera, instrument
+  for (size_t t = 0; t < kMaxInstruments; ++t)
+    for (size_t camera = 0; camera < 2; ++camera) {
+      const auto tip = trackers[t].visible() ? expected(t, camera, seconds) : std::nullopt;
+      for (const ImageInstrument& candidate : seen[camera].instruments)
+        away_px[t][camera].push_back(tip ? away_from(*tip, candidate.tip) : kNever_px);
     }
   const auto cost_px = [&](size_t t, const Assigned& given) {
     double cost = 0;
-    for (size_t eye = 0; eye < 2; ++eye)
-      cost += given[eye] < 0 ? kNotSeen_px : away_px[t][eye][static_cast<size_t>(given[eye])];
+    for (size_t camera = 0; camera < 2; ++camera)
+      cost += given[camera] < 0 ? kNotSeen_px : away_px[t][camera][static_cast<size_t>(given[camera])];
     if (given[0] >= 0 && given[1] >= 0 &&
         !can_be_one_tip(seen[0].instruments[static_cast<size_t>(given[0])].tip,
                         seen[1].instruments[static_cast<size_t>(given[1])].tip))
       cost += kNotOneTip_px;
     return cost;
   };
-  const auto choices = [&](size_t eye) { return static_cast<int>(seen[eye].instruments.size()); };
+  const auto choices = [&](size_t camera) { return static_cast<int>(seen[camera].instruments.size()); };
   const auto differ = [](int a, int b) { return a < 0 || a != b; };
-  double least = std::numeric_limits<double>::max();
-  static_assert(kMostInstruments == 2);
+  double min = std::numeric_limits<double>::max();
+  static_assert(kMaxInstruments == 2);
   Assigned first, second;
   for (first[0] = -1; first[0] < choices(0); ++first[0])
     for (first[1] = -1; first[1] < choices(1); ++first[1])
@@ -157,33 +157,33 @@ void InstrumentTracker::State::follow_visible(std::array<SeenByEye, 2>& seen, do
         for (second[1] = -1; second[1] < choices(1); ++second[1]) {
           if (!differ(first[0], second[0]) || !differ(first[1], second[1])) continue;
           const double cost = cost_px(0, first) + cost_px(1, second);
-          if (cost < least) least = cost, best = {first, second};
+          if (cost < min) min = cost, best = {first, second};
         }
-  for (size_t t = 0; t < kMostInstruments; ++t)
-    for (size_t eye = 0; eye < 2; ++eye) seen[eye].of_tracker[t] = best[t][eye];
+  for (size_t t = 0; t < kMaxInstruments; ++t)
+    for (size_t camera = 0; camera < 2; ++camera) seen[camera].of_tracker[t] = best[t][camera];
 }
 
 /// Which instruments touch another one in either image, so that the outline of their common mask is neither's. They
 /// lose what they were given there.
-std::array<bool, kMostInstruments> InstrumentTracker::State::part_touching(std::array<SeenByEye, 2>& seen,
-                                                                           double seconds) const {
-  std::array<bool, kMostInstruments> touching{};
+std::array<bool, kMaxInstruments> InstrumentTracker::State::part_touching(std::array<SeenByCamera, 2>& seen,
+                                                                          double seconds) const {
+  std::array<bool, kMaxInstruments> touching{};
   if (!std::all_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); })) return touching;
-  for (size_t eye = 0; eye < 2; ++eye) {
-    std::array<int, kMostInstruments>& given = seen[eye].of_tracker;
-    std::array<bool, kMostInstruments> here{};
-    for (size_t t = 0; t < kMostInstruments; ++t) {
+  for (size_t camera = 0; camera < 2; ++camera) {
+    std::array<int, kMaxInstruments>& given = seen[camera].of_tracker;
+    std::array<bool, kMaxInstruments> here{};
+    for (size_t t = 0; t < kMaxInstruments; ++t) {
       if (given[t] >= 0) continue;
-      const auto tip = expected(t, eye, seconds);
-      if (!tip || share_on(seen[eye].found.mask, {0, 0}, *tip) < kTouchingShare) continue;
+      const auto tip = expected(t, camera, seconds);
+      if (!tip || fraction_on(seen[camera].found.mask, {0, 0}, *tip) < kTouchingFraction) continue;
       here[t] = true;
-      for (size_t other = 0; other < kMostInstruments; ++other) {
+      for (size_t other = 0; other < kMaxInstruments; ++other) {
         if (given[other] < 0) continue;
-        const ImageInstrument& its = seen[eye].instruments[static_cast<size_t>(given[other])];
-        if (share_on(its.mask, its.box.tl(), *tip) >= kTouchingShare) here[other] = true;
+        const ImageInstrument& its = seen[camera].instruments[static_cast<size_t>(given[other])];
+        if (fraction_on(its.mask, its.box.tl(), *tip) >= kTouchingFraction) here[other] = true;
       }
     }
-    for (size_t t = 0; t < kMostInstruments; ++t) {
+    for (size_t t = 0; t < kMaxInstruments; ++t) {
       if (!here[t]) continue;
       given[t] = -1;
       touching[t] = true;
@@ -193,10 +193,10 @@ std::array<bool, kMostInstruments> InstrumentTracker::State::part_touching(std::
 }
 
 /// The entry for an instrument that comes into view: its own if it was here before, else a free one.
-std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left, const SeenByEye& seen_left) const {
+std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left, const SeenByCamera& seen_left) const {
   std::optional<size_t> own, free, any;
   double best = kSameDirection, best_of_any = -2;
-  for (size_t t = 0; t < kMostInstruments; ++t) {
+  for (size_t t = 0; t < kMaxInstruments; ++t) {
     if (trackers[t].visible() || seen_left.of_tracker[t] >= 0) continue;
     if (!keeps_its_entry(t)) {
       if (!free) free = t;
@@ -210,9 +210,10 @@ std::optional<size_t> InstrumentTracker::State::entry_for(const ImageTip& left, 
 }
 
 /// Gives what no instrument was given to those that are not visible.
-void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
-  const auto is_given = [](const SeenByEye& eye, size_t i) {
-    return std::find(eye.of_tracker.begin(), eye.of_tracker.end(), static_cast<int>(i)) != eye.of_tracker.end();
+void InstrumentTracker::State::begin_further(std::array<SeenByCamera, 2>& seen) {
+  const auto is_given = [](const SeenByCamera& camera, size_t i) {
+    return std::find(camera.of_tracker.begin(), camera.of_tracker.end(), static_cast<int>(i)) !=
+           camera.of_tracker.end();
   };
   bool beside_another = std::any_of(trackers.begin(), trackers.end(), [](const TipTracker& t) { return t.visible(); });
   bool asks = false;
@@ -220,11 +221,11 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
     if (is_given(seen[0], l) || rests(seen[0].instruments[l], seen[0].found.mask.size(), seen[0].found.still)) continue;
     const ImageTip& left = seen[0].instruments[l].tip;
     std::optional<size_t> partner;
-    double least = std::numeric_limits<double>::max();
+    double min = std::numeric_limits<double>::max();
     for (size_t r = 0; r < seen[1].instruments.size(); ++r) {
       const ImageTip& right = seen[1].instruments[r].tip;
-      if (is_given(seen[1], r) || !can_be_one_tip(left, right) || misfit(left, right) >= least) continue;
-      least = misfit(left, right), partner = r;
+      if (is_given(seen[1], r) || !can_be_one_tip(left, right) || misfit(left, right) >= min) continue;
+      min = misfit(left, right), partner = r;
     }
     if (!partner) continue;
     const auto entry = entry_for(left, seen[0]);
@@ -244,19 +245,19 @@ void InstrumentTracker::State::begin_further(std::array<SeenByEye, 2>& seen) {
   second_seen = asks ? second_seen + 1 : 0;
 }
 
-EyeView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByEye& seen, size_t tracker, size_t eye,
-                                       double seconds) const {
-  EyeView result;
+CameraView InstrumentTracker::State::view(const cv::Mat& bgr, const SeenByCamera& seen, size_t tracker, size_t camera,
+                                          double seconds) const {
+  CameraView result;
   result.mask = seen.found.mask;
-  for (size_t other = 0; other < kMostInstruments; ++other) {
+  for (size_t other = 0; other < kMaxInstruments; ++other) {
     if (other == tracker || seen.of_tracker[other] < 0) continue;
     const ImageInstrument& its = seen.instruments[static_cast<size_t>(seen.of_tracker[other])];
     result.mask = result.mask.clone();
     result.mask(its.box).setTo(0, its.mask);
   }
   if (seen.of_tracker[tracker] >= 0) result.tip = seen.instruments[static_cast<size_t>(seen.of_tracker[tracker])].tip;
-  const std::optional<ImageTip> look_at = result.tip ? result.tip : expected(tracker, eye, seconds);
-  if (look_at) result.layers = finders[eye].layers(bgr, region_around(*look_at), seen.found);
+  const std::optional<ImageTip> look_at = result.tip ? result.tip : expected(tracker, camera, seconds);
+  if (look_at) result.layers = finders[camera].layers(bgr, region_around(*look_at), seen.found);
   return result;
 }
 
@@ -318,7 +319,7 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
                        [&] { finders[1].emplace(options, static_frame.right, organ_mask); },
                        [&] { state_->rows = measure_row_offset(static_frame.left, static_frame.right); });
   for (auto& finder : finders) state_->finders.push_back(std::move(*finder));
-  state_->trackers.assign(kMostInstruments, TipTracker(rectification, state_->rows));
+  state_->trackers.assign(kMaxInstruments, TipTracker(rectification, state_->rows));
 }
 
 InstrumentTracker::~InstrumentTracker() = default;
@@ -327,7 +328,7 @@ InstrumentTracker::InstrumentTracker(InstrumentTracker&&) noexcept = default;
 InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   State& s = *state_;
   InstrumentObservations observations;
-  observations.tips.resize(kMostInstruments);
+  observations.tips.resize(kMaxInstruments);
   const std::array<const cv::Mat*, 2> images = {&pair.left, &pair.right};
   if (!s.example.empty() && pair.index == s.example_frame && !pair.left.empty()) {
     const ExampleColours colours = s.finders[0].learn(pair.left, s.example);
@@ -335,12 +336,12 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   }
   s.way.keep(std::any_of(s.trackers.begin(), s.trackers.end(), [](const TipTracker& t) { return t.marked(); }));
   std::array<FoundInstruments, 2> found = s.find(pair);
-  std::array<SeenByEye, 2> seen;
-  const auto see = [&](size_t eye) {
-    seen[eye].of_tracker.fill(-1);
-    seen[eye].found = found[eye];
-    if (!found[eye].mask.empty())
-      seen[eye].instruments = find_instruments(found[eye].mask, s.finders[eye].picture_area());
+  std::array<SeenByCamera, 2> seen;
+  const auto see = [&](size_t camera) {
+    seen[camera].of_tracker.fill(-1);
+    seen[camera].found = found[camera];
+    if (!found[camera].mask.empty())
+      seen[camera].instruments = find_instruments(found[camera].mask, s.finders[camera].picture_area());
   };
   tbb::parallel_invoke([&] { see(0); }, [&] { see(1); });
   observations.left_mask = seen[0].found.mask;
@@ -354,11 +355,11 @@ InstrumentObservations InstrumentTracker::update(const RectifiedPair& pair) {
   s.follow_visible(seen, seconds);
   const auto touching = s.part_touching(seen, seconds);
   s.begin_further(seen);
-  for (size_t t = 0; t < kMostInstruments; ++t) {
+  for (size_t t = 0; t < kMaxInstruments; ++t) {
     TipTracker& tracker = s.trackers[t];
     if (!tracker.visible() && seen[0].of_tracker[t] < 0) continue;
-    std::array<EyeView, 2> views;
-    const auto view = [&](size_t eye) { views[eye] = s.view(*images[eye], seen[eye], t, eye, seconds); };
+    std::array<CameraView, 2> views;
+    const auto view = [&](size_t camera) { views[camera] = s.view(*images[camera], seen[camera], t, camera, seconds); };
     tbb::parallel_invoke([&] { view(0); }, [&] { view(1); });
     observations.tips[t] = tracker.update(views[0], views[1], pair.index, seconds, touching[t]);
     observations.tips[t].in_image = {views[0].tip, views[1].tip};

@@ -18,7 +18,7 @@
 namespace palpate {
 
 /// Instruments that are kept apart.
-inline constexpr size_t kMostInstruments = 2;
+inline constexpr size_t kMaxInstruments = 2;
 
 /// `instrument` of the scene file.
 struct InstrumentOptions {
@@ -53,10 +53,10 @@ struct TipObservation {
 
 /// What one frame says about all instruments.
 struct InstrumentObservations {
-  std::vector<TipObservation> tips;  ///< always kMostInstruments; an entry stays the same instrument
+  std::vector<TipObservation> tips;  ///< always kMaxInstruments; an entry stays the same instrument
   cv::Mat left_mask;                 ///< 255 = any instrument, rectified left image
   cv::Mat right_mask;
-  bool eyes_out_of_step = false;  ///< the eyes show different moments: whatever moves is misplaced
+  bool eyes_out_of_step = false;  ///< the cameras show different moments: whatever moves is misplaced
 };
 
 /// p of the paper, for each instrument: segmentation, tip in both images, pyramidal Lucas-Kanade between frames,

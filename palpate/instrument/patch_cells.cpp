@@ -13,7 +13,7 @@ constexpr int kCell = 12;        // px of the level that a cell belongs to
 constexpr float kOutlierAt = 3;  // noise levels at which a residual loses half its weight
 
 constexpr float kOutside = -1e9f;
-constexpr size_t kLeastSamples = 12;
+constexpr size_t kMinSamples = 12;
 
 /// Negative outside the image; the layers are never negative.
 float sample_bilinear(const cv::Mat& image, float x, float y) {
@@ -127,7 +127,7 @@ PatchTemplate make_template(const ImageLayers& layers, const cv::Mat& mask, cons
                 sample_at(is_inside ? brightness : layers.metal[level], x, y, step, full - cell.center_px));
           }
         for (PatchCell* cell : {&inside, &outline}) {
-          if (cell->samples.size() < kLeastSamples) continue;
+          if (cell->samples.size() < kMinSamples) continue;
           cell->height_px /= static_cast<double>(cell->samples.size());
           result.cells[level].push_back(std::move(*cell));
         }

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Part of one eye's image, smoothed, ready to be aligned: brightness follows the texture inside the instrument, and
+/// Part of one camera's image, smoothed, ready to be aligned: brightness follows the texture inside the instrument, and
 /// metalness its outline, whatever the background does behind it. Three pyramid levels; float, grey levels 0..255.
 struct ImageLayers {
   static constexpr int kLevels = 3;
@@ -38,7 +38,7 @@ struct PatchCell {
   std::vector<CellSample> samples;
 };
 
-/// What one eye saw of the far part of the instrument; one list of cells per pyramid level.
+/// What one camera saw of the far part of the instrument; one list of cells per pyramid level.
 struct PatchTemplate {
   std::array<std::vector<PatchCell>, ImageLayers::kLevels> cells;
 };

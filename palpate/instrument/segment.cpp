@@ -4,6 +4,7 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
+#include "palpate/core/quantile.h"
 #include "palpate/instrument/find_tip.h"
 
 namespace palpate {
@@ -18,30 +19,25 @@ constexpr int kTissueMoves = 7;       // px at half size, twice the way and one
 constexpr int kNearby = 15;           // px at half size
 constexpr int kOtherRedness = 13;     // 255ths beyond what was seen nearby
 constexpr double kContinuedWidths = 4;
-constexpr double kLeastContinued_px = 3;  // at half size
-constexpr double kLeastNew = 0.2;         // share of an instrument that was not there in the static frame
-constexpr double kLeftShare = 0.9;        // of a part that stood still, where tissue shows instead
-constexpr double kLit = 1.5;              // times the least value, to tell tissue from shadow
-constexpr double kBlack = 8;              // grey levels of what is around the picture
-constexpr double kBlackShare = 0.05;      // the same, of the picture's brightness, where the surround is lit a little
-constexpr int kDarkest = 12;              // grey levels
-constexpr double kPalest = 0.08;          // redness of tissue that can still be told from metal
+constexpr double kMinContinued_px = 3;   // at half size
+constexpr double kMinNew = 0.2;          // fraction of an instrument that was not there in the static frame
+constexpr double kMuchMore = 1.5;        // times what was found without what is still
+constexpr double kLeftFraction = 0.9;    // of a part that stood still, where tissue shows instead
+constexpr double kLit = 1.5;             // times the least value, to tell tissue from shadow
+constexpr double kBlack = 8;             // grey levels of what is around the picture
+constexpr double kBlackFraction = 0.05;  // the same, of the picture's brightness, where the surround is lit a little
+constexpr int kDarkest = 12;             // grey levels
+constexpr double kPalest = 0.08;         // redness of tissue that can still be told from metal
 constexpr double kReddest = 0.6;
 constexpr int kPlace = 8;   // px at half size over which the redness of tissue is averaged
 constexpr int kAround = 3;  // places to each side
-constexpr size_t kFewestPlaces = 4;
-constexpr double kClearlyPaler = 0.5;  // as a share of the organ's redness
+constexpr size_t kMinPlaces = 4;
+constexpr double kClearlyPaler = 0.5;  // as a fraction of the organ's redness
 
 cv::Mat half_size(const cv::Mat& image) {
   cv::Mat half;
   cv::resize(image, half, cv::Size((image.cols + 1) / 2, (image.rows + 1) / 2), 0, 0, cv::INTER_AREA);
   return half;
-}
-
-double percentile(std::vector<float>& values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 /// Red over green, and only a little of green over blue: metal may be olive or brown.
@@ -59,11 +55,11 @@ int value_of(const cv::Vec3b& p) {
 }
 
 /// How much pixels look like metal beside tissue of the given redness; see metalness.
-cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, double least_value) {
+cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, double min_value) {
   cv::Mat result(bgr.size(), CV_8U);
   cv::Mat planes[3];
   cv::split(bgr, planes);  // so that the compiler can take many pixels at once
-  const float per_least = static_cast<float>(2 / least_value);
+  const float per_min = static_cast<float>(2 / min_value);
   const int columns = bgr.cols;
   for (int y = 0; y < bgr.rows; ++y) {
     const uchar* __restrict blue = planes[0].ptr<uchar>(y);
@@ -73,10 +69,10 @@ cv::Mat metalness_beside(const cv::Mat& bgr, const cv::Mat& tissue_redness, doub
     uchar* __restrict to = result.ptr<uchar>(y);
     for (int x = 0; x < columns; ++x) {
       const int b = blue[x], g = green[x], r = red[x];
-      const int most = b < g ? g : b, value = r < most ? most : r;
+      const int max = b < g ? g : b, value = r < max ? max : r;
       const int redness = redness_of(b, g, r);
       const float of_tissue = 255.0f * static_cast<float>(redness) / static_cast<float>(value * tissue[x] + 1);
-      const float bright = per_least * static_cast<float>(value) - 1;
+      const float bright = per_min * static_cast<float>(value) - 1;
       const float lit = bright < 0 ? 0 : bright > 1 ? 1 : bright;
       to[x] = static_cast<uchar>(static_cast<int>(255 * lit * (of_tissue > 1 ? 0 : 1 - of_tissue)));
     }
@@ -110,8 +106,8 @@ double learn_organ(const StaticTissue& tissue, SegmentationModel& model) {
       redness.push_back(relative_redness(p));
     }
   if (value.size() < 100) return kReddest;
-  model.least_value = std::clamp(0.2 * percentile(value, 0.9), 14.0, 32.0);
-  return percentile(redness, 0.2);
+  model.min_value = std::clamp(0.2 * quantile_of(value, 0.9), 14.0, 32.0);
+  return quantile_of(redness, 0.2);
 }
 
 /// The same redness everywhere.
@@ -135,7 +131,7 @@ void learn_redness_of_places(const StaticTissue& tissue, SegmentationModel& mode
       for (int y = box.y; y < box.br().y; ++y)
         for (int x = box.x; x < box.br().x; ++x) {
           const cv::Vec3b& p = tissue.at(y, x);
-          if (!tissue.shows(y, x) || value_of(p) < model.least_value || value_of(p) > kNearSaturation) continue;
+          if (!tissue.shows(y, x) || value_of(p) < model.min_value || value_of(p) > kNearSaturation) continue;
           sum += relative_redness(p);
           ++count;
         }
@@ -148,7 +144,7 @@ void learn_redness_of_places(const StaticTissue& tissue, SegmentationModel& mode
       for (int y = std::max(0, row - kAround); y <= std::min(rows - 1, row + kAround); ++y)
         for (int x = std::max(0, column - kAround); x <= std::min(columns - 1, column + kAround); ++x)
           if (places.at<float>(y, x) >= 0) values.push_back(places.at<float>(y, x));
-      double redness = values.size() < kFewestPlaces ? everywhere : percentile(values, 0.2);
+      double redness = values.size() < kMinPlaces ? everywhere : quantile_of(values, 0.2);
       if (redness > kClearlyPaler * everywhere) redness = everywhere;
       around.at<float>(row, column) = static_cast<float>(255 * std::max(redness, kPalest));
     }
@@ -159,7 +155,7 @@ void learn_redness_of_places(const StaticTissue& tissue, SegmentationModel& mode
 }
 
 cv::Mat grey_pixels(const cv::Mat& half_bgr, const SegmentationModel& model) {
-  return metalness_beside(half_bgr, model.tissue_redness_half, model.least_value) >= 128;
+  return metalness_beside(half_bgr, model.tissue_redness_half, model.min_value) >= 128;
 }
 
 /// Those of the grey pixels that look like what is still there since the static frame.
@@ -207,12 +203,12 @@ cv::Mat instrument_blobs(const cv::Mat& grey, const cv::Mat& half_picture_area) 
   cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-  const double least_area = 0.0015 * mask.rows * mask.cols;
+  const double min_area = 0.0015 * mask.rows * mask.cols;
   cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U), inside;
   cv::erode(half_picture_area, inside, cv::Mat::ones(5, 5, CV_8U), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
   const auto at_border = [&inside](const cv::Point& p) { return !inside.at<uchar>(p); };
   for (size_t i = 0; i < outlines.size(); ++i) {
-    if (cv::contourArea(outlines[i]) < least_area) continue;
+    if (cv::contourArea(outlines[i]) < min_area) continue;
     // What only comes near it is, by its colours alone, as likely a highlight.
     if (std::none_of(outlines[i].begin(), outlines[i].end(), at_border)) continue;
     cv::Mat blob = cv::Mat::zeros(mask.size(), CV_8U);
@@ -296,10 +292,9 @@ cv::Mat continued(const cv::Mat& half_bgr, const cv::Mat& grey, const cv::Mat& m
     for (int y = 0; y < box.height; ++y)
       for (int x = 0; x < box.width; ++x) {
         const int value = value_of(part.at<cv::Vec3b>(y, x)), now = redness.at<uchar>(y, x);
-        if (!strip.at<uchar>(y, x) || value < model.least_value || value > kNearSaturation) continue;
-        const int least = model.least_redness_half(box).at<uchar>(y, x),
-                  most = model.most_redness_half(box).at<uchar>(y, x);
-        if (now < least - kOtherRedness || now > most + kOtherRedness) joined.at<uchar>(y, x) = 255;
+        if (!strip.at<uchar>(y, x) || value < model.min_value || value > kNearSaturation) continue;
+        const int min = model.min_redness_half(box).at<uchar>(y, x), max = model.max_redness_half(box).at<uchar>(y, x);
+        if (now < min - kOtherRedness || now > max + kOtherRedness) joined.at<uchar>(y, x) = 255;
       }
     joined |= strip & (grey(box) | own);
     cv::morphologyEx(joined, joined, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
@@ -321,7 +316,7 @@ cv::Mat continued(const cv::Mat& half_bgr, const cv::Mat& grey, const cv::Mat& m
         farthest = std::max(farthest, (cv::Point2d(x + box.x, y + box.y) - tip.tip_px).dot(tip.axis));
       }
     // Less than that is the blurred edge of what was found.
-    if (farthest > kLeastContinued_px) result(box) |= further;
+    if (farthest > kMinContinued_px) result(box) |= further;
   }
   return result;
 }
@@ -367,12 +362,10 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
   cv::split(bgr, channels);
   cv::max(channels[0], channels[1], value);
   cv::max(value, channels[2], value);
-  std::vector<uchar> sorted;
+  std::vector<uchar> some;
   for (int y = 0; y < value.rows; y += 4)
-    for (int x = 0; x < value.cols; x += 4) sorted.push_back(value.at<uchar>(y, x));
-  const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), bright, sorted.end());
-  cv::Mat black = value < std::max(kBlack, kBlackShare * *bright);
+    for (int x = 0; x < value.cols; x += 4) some.push_back(value.at<uchar>(y, x));
+  cv::Mat black = value < std::max(kBlack, kBlackFraction * quantile_of(some, 0.95));
   cv::morphologyEx(black, black, cv::MORPH_OPEN, cv::Mat::ones(7, 7, CV_8U));
   cv::copyMakeBorder(black, black, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
   cv::floodFill(black, cv::Point(0, 0), 128);
@@ -380,7 +373,7 @@ cv::Mat find_picture_area(const cv::Mat& bgr) {
 }
 
 cv::Mat metalness(const cv::Mat& bgr, const cv::Rect& part, const SegmentationModel& model) {
-  return metalness_beside(bgr(part), model.tissue_redness(part), model.least_value);
+  return metalness_beside(bgr(part), model.tissue_redness(part), model.min_value);
 }
 
 void forget_what_left(const cv::Mat& bgr, SegmentationModel& model) {
@@ -388,18 +381,18 @@ void forget_what_left(const cv::Mat& bgr, SegmentationModel& model) {
   if (box.area() == 0) return;
   const cv::Rect full = cv::Rect(2 * box.tl(), box.size() * 2) & cv::Rect({}, bgr.size());
   const cv::Mat half = half_size(bgr(full));
-  const cv::Mat metal = metalness_beside(half, model.tissue_redness_half(box), model.least_value);
+  const cv::Mat metal = metalness_beside(half, model.tissue_redness_half(box), model.min_value);
   const cv::Mat parts = model.still_parts(box);
   std::array<int, 256> all{}, tissue{};
   for (int y = 0; y < box.height; ++y)
     for (int x = 0; x < box.width; ++x) {
       const uchar part = parts.at<uchar>(y, x);
       ++all[part];
-      tissue[part] += metal.at<uchar>(y, x) < 128 && value_of(half.at<cv::Vec3b>(y, x)) > kLit * model.least_value;
+      tissue[part] += metal.at<uchar>(y, x) < 128 && value_of(half.at<cv::Vec3b>(y, x)) > kLit * model.min_value;
     }
   for (int part = 1; part < 256; ++part) {
     const size_t at = static_cast<size_t>(part);
-    if (all[at] == 0 || tissue[at] < kLeftShare * all[at]) continue;
+    if (all[at] == 0 || tissue[at] < kLeftFraction * all[at]) continue;
     cv::Mat place;
     cv::dilate(model.still_parts == part, place, cv::Mat::ones(kTissueMoves, kTissueMoves, CV_8U));
     model.still_darkest.setTo(255, place);
@@ -434,8 +427,8 @@ SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& o
   cv::Mat smooth;
   cv::blur(model.reference_half, smooth, {3, 3});
   const cv::Mat redness = redness_image(smooth), nearby = cv::Mat::ones(kNearby, kNearby, CV_8U);
-  cv::erode(redness, model.least_redness_half, nearby);
-  cv::dilate(redness, model.most_redness_half, nearby);
+  cv::erode(redness, model.min_redness_half, nearby);
+  cv::dilate(redness, model.max_redness_half, nearby);
   return model;
 }
 
@@ -443,11 +436,11 @@ cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model) {
   const cv::Mat half = half_size(bgr), &half_area = model.picture_area_half;
   const cv::Mat grey = grey_pixels(half, model), still = still_pixels(grey, half, model);
   cv::Mat coarse = instrument_blobs(grey & ~still, half_area);
-  // An instrument that stood at the border in the static frame, too short to be recognised, hangs on what is still.
-  if (cv::countNonZero(coarse) == 0) {
-    coarse = instrument_blobs(grey & ~(still & ~model.still_at_border), half_area);
-    if (cv::countNonZero(coarse & ~still) < kLeastNew * cv::countNonZero(coarse)) coarse.setTo(0);
-  }
+  // An instrument that stood at the border in the static frame, too short to be recognised, hangs on what is still, or
+  // is cut in two by it.
+  const cv::Mat joined = instrument_blobs(grey & ~(still & ~model.still_at_border), half_area);
+  const int now = cv::countNonZero(joined), fresh = cv::countNonZero(joined & ~still);
+  if (fresh >= kMinNew * now && fresh > kMuchMore * cv::countNonZero(coarse)) coarse = joined;
   if (cv::countNonZero(coarse) == 0) return cv::Mat::zeros(bgr.size(), CV_8U);
   const cv::Mat further = continued(half, grey & ~still, coarse, model);
   return refine(bgr, coarse | further, further, model);

@@ -7,7 +7,7 @@ namespace palpate {
 
 /// Appearance of the scene, adapted at the start from static frames (colour statistics of the organ region).
 struct SegmentationModel {
-  cv::Mat reference_bgr;   ///< rectified image of the static frame, same eye as the images to segment
+  cv::Mat reference_bgr;   ///< rectified image of the static frame, same camera as the images to segment
   cv::Mat reference_mask;  ///< 255 where the static frame already shows an instrument
   cv::Mat picture_area;    ///< 255 inside the picture, 0 in the black surround of scope or rectification
   cv::Mat picture_area_half;
@@ -22,14 +22,15 @@ struct SegmentationModel {
   /// colour than red tissue is. Of the whole image, and at half size.
   cv::Mat tissue_redness, tissue_redness_half;
   /// Least and greatest redness of the static frame within a few pixels, in 255ths; half size.
-  cv::Mat least_redness_half, most_redness_half;
-  double least_value = 24;  ///< darker pixels have no colour to judge, grey levels
+  cv::Mat min_redness_half, max_redness_half;
+  double min_value = 24;  ///< darker pixels have no colour to judge, grey levels
 };
 
 /// 255 where the picture is: everything but the dark surround that touches the border of the image.
 cv::Mat find_picture_area(const cv::Mat& bgr);
 
-/// Learns what is tissue from a static frame of one eye. `organ_mask` (255 = surely tissue; may be empty) narrows it.
+/// Learns what is tissue from a static frame of one camera. `organ_mask` (255 = surely tissue; may be empty) narrows
+/// it.
 SegmentationModel learn_segmentation(const cv::Mat& static_bgr, const cv::Mat& organ_mask);
 
 /// 255 where one image shows an instrument: metal (grey, low chroma) on tissue (red), changed against the static frame,

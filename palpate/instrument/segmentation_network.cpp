@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kPixels = 320 * 192;  // of our own network's input
 constexpr int kMultiple = 32;          // of which the sides of an input of open size are: most networks ask for it
-constexpr int kMostClasses = 256;
+constexpr int kMaxClasses = 256;
 
 [[noreturn]] void refuse(const std::filesystem::path& onnx, const std::string& why) {
   throw BadInput(
@@ -117,10 +117,10 @@ cv::Mat SegmentationNetwork::Network::scores(const cv::Mat& bgr) {
 void SegmentationNetwork::Network::check_output(const cv::Mat& scores) {
   const std::vector<int> shape(scores.size.p, scores.size.p + scores.dims);
   const bool is_image = shape.size() == 4 && shape[0] == 1 && scores.depth() == CV_32F;
-  if (is_image && shape[3] <= kMostClasses && shape[3] < shape[1] && shape[3] < shape[2] && shape[2] > 1)
+  if (is_image && shape[3] <= kMaxClasses && shape[3] < shape[1] && shape[3] < shape[2] && shape[2] > 1)
     output_channels_last = true;
   const int classes = !is_image ? 0 : output_channels_last ? shape[3] : shape[1];
-  if (!is_image || classes > kMostClasses || shape[2] < 2 || (!output_channels_last && shape[3] < 2))
+  if (!is_image || classes > kMaxClasses || shape[2] < 2 || (!output_channels_last && shape[3] < 2))
     refuse(onnx, fmt::format("the output is {}", fmt::join(shape, " x ")));
   if (classes > 1 && options.instrument_class >= classes)
     throw BadInput(fmt::format("instrument.class is {}, but {} has the classes 0 to {}", options.instrument_class,

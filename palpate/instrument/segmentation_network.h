@@ -15,7 +15,7 @@ struct NetworkOptions {
   Eigen::Vector3d deviation_rgb = Eigen::Vector3d::Ones();  ///< what is left is divided by it
 };
 
-/// A learned network that finds instruments in one eye's images. It has one input, 1 x 3 x height x width or
+/// A learned network that finds instruments in one camera's images. It has one input, 1 x 3 x height x width or
 /// 1 x height x width x 3, float, RGB; and one output, 1 x classes x height x width or 1 x height x width x classes, of
 /// any size: with one channel the instrument's probability or its logit, with several channels scores (logits or
 /// probabilities) of which the greatest wins. Images are scaled to the input's size and letter-boxed; where the file

@@ -6,14 +6,14 @@ namespace palpate {
 
 namespace {
 
-constexpr double kTemplateWidths = 2.5;       // length of the followed part behind the tip, in shaft widths
-constexpr double kGoodAgreement = 0.6;        // below, a keyframe has become too unlike what is seen
-constexpr double kLeastAgreementAlone = 0.5;  // for a frame in which the mask gives no tip
-constexpr double kKeyframeReach_px = 40;      // motion after which a fresh keyframe is better
-constexpr int kMostFramesAlone = 5;           // without any tip from the masks
-constexpr int kMostFramesTrusted = 100;       // the same where the texture has to be trusted for longer
-constexpr int kMostRejected = 3;              // detections outside the gate before the filter starts anew
-constexpr double kThinnest_mm = 0.8;          // shaft of an instrument
+constexpr double kTemplateWidths = 2.5;     // length of the followed part behind the tip, in shaft widths
+constexpr double kGoodAgreement = 0.6;      // below, a keyframe has become too unlike what is seen
+constexpr double kMinAgreementAlone = 0.5;  // for a frame in which the mask gives no tip
+constexpr double kKeyframeReach_px = 40;    // motion after which a fresh keyframe is better
+constexpr int kMaxFramesAlone = 5;          // without any tip from the masks
+constexpr int kMaxFramesTrusted = 100;      // the same where the texture has to be trusted for longer
+constexpr int kMaxRejected = 3;             // detections outside the gate before the filter starts anew
+constexpr double kThinnest_mm = 0.8;        // shaft of an instrument
 constexpr double kThickest_mm = 25;
 constexpr double kTipDeviation_px = 0.7;  // where the mask ends against where the jaws end
 constexpr double kDisparityFloor_px = 0.2;
@@ -21,7 +21,8 @@ constexpr double kUnfit_px = 1.5;  // of disparity, for a template of which noth
 constexpr double kClearlyBetterFit = 0.1;
 constexpr double kBias_mm = 0.25;  // what does not average out over frames: outline, one side of the jaws seen
 constexpr double kMotionFloor_mm = 0.02;
-constexpr double kMotionModelShare = 0.04;  // of a displacement: light that does not move along, depths of the template
+constexpr double kMotionModelFraction =
+    0.04;  // of a displacement: light that does not move along, depths of the template
 
 double followed_length_px(const ImageTip& tip) {
   return std::clamp(kTemplateWidths * tip.width_px, 60.0, 220.0);
@@ -65,7 +66,7 @@ struct TipTracker::Detection {
   Mat3 covariance_mm2 = Mat3::Identity();
 };
 
-std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, const EyeView& right) const {
+std::optional<TipTracker::Detection> TipTracker::detect(const CameraView& left, const CameraView& right) const {
   const Rectification& r = rectification_;
   if (!left.tip || !right.tip || !can_be_one_tip(*left.tip, *right.tip)) return {};
   const double guess = left.tip->tip_px.x - right.tip->tip_px.x;
@@ -88,7 +89,7 @@ std::optional<TipTracker::Detection> TipTracker::detect(const EyeView& left, con
   return detection;
 }
 
-TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int index, double seconds,
+TipObservation TipTracker::update(const CameraView& left, const CameraView& right, int index, double seconds,
                                   bool touches_another) {
   last_row_.reset();
   std::optional<Detection> detection = detect(left, right);
@@ -98,8 +99,8 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
   // end, and its contact hangs on it.
   const bool trusted = touches_another || (marked_ && measured && measured->agreement > kGoodAgreement);
   const bool followed = measured && filter_.started() &&
-                        frames_alone_ <= (trusted ? kMostFramesTrusted : kMostFramesAlone) &&
-                        (detection || measured->agreement > kLeastAgreementAlone);
+                        frames_alone_ <= (trusted ? kMaxFramesTrusted : kMaxFramesAlone) &&
+                        (detection || measured->agreement > kMinAgreementAlone);
   TipObservation observation;
   if (!detection && !followed) {
     lose();
@@ -114,8 +115,8 @@ TipObservation TipTracker::update(const EyeView& left, const EyeView& right, int
 
   if (detection) {
     last_plane_ = detection->plane;
-    eye_lag_.add(index, left.tip->tip_px.y, right.tip->tip_px.y);
-    eyes_out_of_step_ = eye_lag_.frames().value_or(eyes_out_of_step_ ? 1 : 0) != 0;
+    synchronization_.add(index, left.tip->tip_px.y, right.tip->tip_px.y);
+    out_of_step_ = synchronization_.frames().value_or(out_of_step_ ? 1 : 0) != 0;
   }
   if (left.tip) last_tips_[0] = left.tip;
   if (right.tip) last_tips_[1] = right.tip;
@@ -151,7 +152,7 @@ TipObservation TipTracker::update(const std::optional<TipTrack::Row>& row) {
   return observation;
 }
 
-std::optional<RigidMotion> TipTracker::motion_since_keyframe(const EyeView& left, const EyeView& right,
+std::optional<RigidMotion> TipTracker::motion_since_keyframe(const CameraView& left, const CameraView& right,
                                                              const std::optional<Detection>& detection,
                                                              double seconds) const {
   if (!keyframe_) return {};
@@ -189,7 +190,7 @@ bool TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
   }
   // A held tip hides in the tissue, and its mask then ends wherever the tissue begins.
   const bool held = followed && marked_ && measured->agreement > kGoodAgreement;
-  if (detection && (!filter_.started() || (rejected_ >= kMostRejected && !held))) {
+  if (detection && (!filter_.started() || (rejected_ >= kMaxRejected && !held))) {
     filter_.start(detection->tip_mm, detection->covariance_mm2);
     rejected_ = 0;
   } else if (detection && corrected()) {
@@ -223,7 +224,7 @@ bool TipTracker::advance(const std::optional<RigidMotion>& measured, bool follow
   return true;
 }
 
-void TipTracker::renew_keyframe(std::optional<Detection> detection, const EyeView& right) {
+void TipTracker::renew_keyframe(std::optional<Detection> detection, const CameraView& right) {
   const double travelled_px = keyframe_
                                   ? cv::norm(left_pixel(rectification_, keyframe_->tip_mm) -
                                              left_pixel(rectification_, keyframe_->tip_mm + motion_.translation_mm))
@@ -264,7 +265,7 @@ void TipTracker::report_since_mark(TipObservation& observation) const {
   Mat3 covariance = filter_.position_covariance_mm2() + covariance_at_mark_mm2_;
   if (motion_at_mark_ && motion_.agreement > 0) {
     since = motion_.translation_mm - motion_at_mark_->translation_mm;
-    const double model = kMotionModelShare * since.norm();
+    const double model = kMotionModelFraction * since.norm();
     covariance = motion_.covariance_mm2 + motion_at_mark_->covariance_mm2 +
                  (kMotionFloor_mm * kMotionFloor_mm + model * model) * Mat3::Identity();
   }
@@ -272,9 +273,9 @@ void TipTracker::report_since_mark(TipObservation& observation) const {
   observation.since_mark_covariance_mm2 = left_from_rectified * covariance * left_from_rectified.transpose();
 }
 
-cv::Point2d TipTracker::expected_px(size_t eye, double seconds) const {
+cv::Point2d TipTracker::expected_px(size_t camera, double seconds) const {
   const Vec3 tip_mm = filter_.position_mm() + seconds * filter_.velocity_mm_per_s();
-  const double disparity = eye == 0 ? 0 : rectification_.disparity_px(tip_mm.z());
+  const double disparity = camera == 0 ? 0 : rectification_.disparity_px(tip_mm.z());
   return left_pixel(rectification_, tip_mm) - cv::Point2d(disparity, 0);
 }
 

@@ -3,16 +3,16 @@
 #include <array>
 #include <optional>
 
-#include "palpate/instrument/eye_lag.h"
 #include "palpate/instrument/instrument_tracker.h"
 #include "palpate/instrument/rigid_motion.h"
+#include "palpate/instrument/stereo_synchronization.h"
 #include "palpate/instrument/tip_filter.h"
 #include "palpate/instrument/tip_track.h"
 
 namespace palpate {
 
-/// What one eye sees of one instrument in one frame.
-struct EyeView {
+/// What one camera sees of one instrument in one frame.
+struct CameraView {
   cv::Mat mask;                 ///< 255 = this instrument, of the whole image
   std::optional<ImageTip> tip;  ///< nothing when the mask shows none
   ImageLayers layers;           ///< around the tip, or around where it was last
@@ -21,7 +21,7 @@ struct EyeView {
 /// The part of the image around a tip in which TipTracker looks.
 cv::Rect region_around(const ImageTip& tip);
 
-/// Whether two tips can be the same one seen by the left and the right eye.
+/// Whether two tips can be the same one seen by the left and the right camera.
 bool can_be_one_tip(const ImageTip& left, const ImageTip& right);
 
 /// Follows one instrument in 3D, told where it is in each image: Lucas-Kanade against a keyframe, epipolar match,
@@ -32,7 +32,8 @@ class TipTracker {
 
   /// `seconds` since the last frame, `index` of this one. `touches_another`: the masks do not tell where this one ends,
   /// so that its texture has to be trusted for longer.
-  TipObservation update(const EyeView& left, const EyeView& right, int index, double seconds, bool touches_another);
+  TipObservation update(const CameraView& left, const CameraView& right, int index, double seconds,
+                        bool touches_another);
 
   /// The same from a row of a tip track, if there is one for this frame.
   TipObservation update(const std::optional<TipTrack::Row>& row);
@@ -43,21 +44,21 @@ class TipTracker {
 
   bool visible() const { return visible_; }
   bool marked() const { return marked_; }
-  bool eyes_out_of_step() const { return eyes_out_of_step_; }
+  bool eyes_out_of_step() const { return out_of_step_; }
   /// In the left (0) or right (1) image, as last seen.
-  const std::optional<ImageTip>& last_tip(size_t eye) const { return last_tips_[eye]; }
+  const std::optional<ImageTip>& last_tip(size_t camera) const { return last_tips_[camera]; }
   /// Where the visible tip is expected in an image after `seconds`.
-  cv::Point2d expected_px(size_t eye, double seconds) const;
+  cv::Point2d expected_px(size_t camera, double seconds) const;
 
  private:
   struct Detection;
-  std::optional<Detection> detect(const EyeView& left, const EyeView& right) const;
-  std::optional<RigidMotion> motion_since_keyframe(const EyeView& left, const EyeView& right,
+  std::optional<Detection> detect(const CameraView& left, const CameraView& right) const;
+  std::optional<RigidMotion> motion_since_keyframe(const CameraView& left, const CameraView& right,
                                                    const std::optional<Detection>& detection, double seconds) const;
   Mat3 step_covariance(const RigidMotion& motion) const;
   bool advance(const std::optional<RigidMotion>& measured, bool followed, const std::optional<Detection>& detection,
                double seconds);
-  void renew_keyframe(std::optional<Detection> detection, const EyeView& right);
+  void renew_keyframe(std::optional<Detection> detection, const CameraView& right);
   void use_fresh_keyframe();
   void lose();
   void report_since_mark(TipObservation& observation) const;
@@ -65,8 +66,8 @@ class TipTracker {
   Rectification rectification_;
   RowOffset rows_;
   TipFilter filter_;
-  EyeLag eye_lag_;
-  bool eyes_out_of_step_ = false;                     // as last found; it stays so while nothing moves
+  StereoSynchronization synchronization_;
+  bool out_of_step_ = false;                          // as last found; it stays so while nothing moves
   std::array<std::optional<ImageTip>, 2> last_tips_;  // where to look when a mask shows none
   std::optional<InstrumentPlane> last_plane_;         // of the last detection
   std::optional<InstrumentKeyframe> keyframe_;

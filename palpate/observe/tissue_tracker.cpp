@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
@@ -64,9 +66,8 @@ double saturation_of_highlights(const cv::Mat& bgr, const cv::Mat& tissue) {
     for (int x = 0; x < bgr.cols; x += kEvery_px)
       if (tissue.at<uchar>(y, x)) saturations.push_back(saturation(bgr.at<cv::Vec3b>(y, x)));
   if (saturations.empty()) return 0;
-  const auto middle = saturations.begin() + static_cast<std::ptrdiff_t>(saturations.size() / 2);
-  std::nth_element(saturations.begin(), middle, saturations.end());
-  return kRatio * *middle;
+  const auto middle = median_of(saturations);
+  return kRatio * middle;
 }
 
 bool is_highlight(const cv::Vec3b& pixel, double white) {

@@ -22,7 +22,7 @@ namespace palpate {
 namespace {
 
 /// Outlines may run along the border of the image, not mostly outside.
-constexpr double kLeastShareInImage = 0.5;
+constexpr double kMinFractionInImage = 0.5;
 constexpr double kBlack_levels = 40, kLongestDarkness_s = 10;
 
 /// A region drawn in a picture of another size selects the wrong tissue, or none.
@@ -30,7 +30,7 @@ void require_region_in_image(const std::vector<cv::Point2d>& region_px, cv::Size
   if (region_px.empty()) return;
   const std::vector<cv::Point2f> corners(region_px.begin(), region_px.end());
   const cv::Rect2f around = cv::boundingRect(corners), image({0, 0}, cv::Size2f(size));
-  if ((around & image).area() >= kLeastShareInImage * around.area()) return;
+  if ((around & image).area() >= kMinFractionInImage * around.area()) return;
   throw BadInput(fmt::format(
       "map.organ_region_px reaches from ({:g}, {:g}) to ({:g}, {:g}), expected corners inside the left image of {}x{} "
       "px",

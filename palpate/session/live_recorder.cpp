@@ -20,7 +20,7 @@ namespace palpate {
 
 namespace {
 
-constexpr size_t kMostWaiting = 50;
+constexpr size_t kMaxWaiting = 50;
 /// Tissue is measured in these pictures: finer than a video to look at.
 constexpr int kQuality_crf = 14;
 
@@ -95,7 +95,7 @@ struct LiveRecorder::State {
   void take(const StereoFrame& frame) {
     if (frame.left.empty()) return;
     const std::lock_guard lock(mutex);
-    if (waiting.size() < kMostWaiting && !ends)
+    if (waiting.size() < kMaxWaiting && !ends)
       waiting.push_back(frame);
     else
       ++kept.left_out;

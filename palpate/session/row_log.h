@@ -16,10 +16,10 @@ class RowLog {
     const std::lock_guard lock(mutex_);
     rows_.push_back(std::move(row));
   }
-  std::vector<ForceRow> from(size_t first, size_t most) const {
+  std::vector<ForceRow> from(size_t first, size_t max) const {
     const std::lock_guard lock(mutex_);
     first = std::min(first, rows_.size());
-    const size_t last = first + std::min(most, rows_.size() - first);
+    const size_t last = first + std::min(max, rows_.size() - first);
     return {rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.begin() + static_cast<std::ptrdiff_t>(last)};
   }
   size_t size() const {

@@ -12,7 +12,7 @@ namespace palpate {
 namespace {
 
 constexpr int kReportPictures = 6, kEvery_frames = 25;
-constexpr size_t kMostKept = 64;
+constexpr size_t kMaxKept = 64;
 
 std::string run_yaml(SceneFile scene_file, const Rectification& rectification, const std::vector<ForceRow>& rows,
                      int dropped) {
@@ -52,7 +52,7 @@ PictureChoice::PictureChoice(int frames, std::string unit)
 
 void PictureChoice::offer(const cv::Mat& overlay, const ForceEstimate& estimate) {
   if (estimate.frame % every_ != 0) return;
-  if (pictures_.size() >= kMostKept) {
+  if (pictures_.size() >= kMaxKept) {
     every_ *= 2;
     for (size_t i = 0; 2 * i < pictures_.size(); ++i) pictures_[i] = std::move(pictures_[2 * i]);
     pictures_.resize(pictures_.size() / 2);

@@ -55,13 +55,13 @@ std::string new_scene_text(const std::string& left, const std::string& right, co
     for (char c : name) text += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
     return text + "\"";
   };
-  const std::string eyes = stereo.empty() ? fmt::format("  left: {}\n  right: {}\n", quoted(left), quoted(right))
-                                          : fmt::format("  stereo: {}\n", quoted(stereo));
+  const std::string cameras = stereo.empty() ? fmt::format("  left: {}\n  right: {}\n", quoted(left), quoted(right))
+                                             : fmt::format("  stereo: {}\n", quoted(stereo));
   return fmt::format(
       "recording:\n{}  calibration: {}\nmap:\n  frame: 0\n  elements: 1344\n  thickness_mm: 25\ntissue:\n"
       "  preset: liver\nattachments:\n  - underside: {{depth_mm: 3}}\ninstrument: {{segmentation: learned}}\n"
       "contact: {{grip: auto}}\n",
-      eyes, quoted(calibration));
+      cameras, quoted(calibration));
 }
 
 std::vector<KeyRow> scene_keys() {

@@ -24,7 +24,7 @@ namespace palpate {
 
 namespace {
 
-constexpr size_t kMostEditsKept = 500;
+constexpr size_t kMaxEditsKept = 500;
 /// A live source is shown as often where nothing runs.
 constexpr auto kBetweenLooks = std::chrono::milliseconds(250);
 
@@ -193,7 +193,7 @@ struct Session::State {
     if (after == before) return;
     take_scene(after, now.scene_file, false);
     undo.push_back(before);
-    if (undo.size() > kMostEditsKept) undo.erase(undo.begin());
+    if (undo.size() > kMaxEditsKept) undo.erase(undo.begin());
     redo.clear();
   }
 

@@ -22,7 +22,7 @@ std::string phase_name(Phase phase);
 
 /// A recording that is open, and the frame of it that is looked at.
 struct SourceView {
-  cv::Size size;  ///< of one eye
+  cv::Size size;  ///< of one camera
   double fps = 0;
   int frame_count = -1;  ///< -1 = unknown
   RecordingTiming timing;

@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-const int kMostSteps = 64;
+const int kMaxSteps = 64;
 
 // Rows of constant v, row j with steps + 1 - j texels.
 int place(int steps, int i, int j) {
@@ -32,7 +32,7 @@ BakedTexture::BakedTexture(const Surface& rest, const Texture& texture, double t
     };
     const double longest =
         std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
-    const int steps = std::clamp(static_cast<int>(std::ceil(longest * texels_per_mm)), 1, kMostSteps);
+    const int steps = std::clamp(static_cast<int>(std::ceil(longest * texels_per_mm)), 1, kMaxSteps);
     grids_[t].first = total;
     grids_[t].steps = static_cast<unsigned short>(steps);
     total += texel_count(steps);

@@ -39,7 +39,7 @@ double mean_thickness_mm(const Surface& organ) {
 std::vector<cv::Point2d> outline(const cv::Mat& mask) {
   std::vector<std::vector<cv::Point>> contours;
   cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-  if (contours.empty()) throw BadInput("simulate.body: the organ is not in view of the left eye");
+  if (contours.empty()) throw BadInput("simulate.body: the organ is not in view of the left camera");
   const auto largest = std::max_element(contours.begin(), contours.end(), [](const auto& a, const auto& b) {
     return cv::contourArea(a) < cv::contourArea(b);
   });

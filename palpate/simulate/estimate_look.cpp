@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/simulate/ray_scene.h"
 #include "palpate/simulate/sensor.h"
 #include "palpate/simulate/shading.h"
@@ -20,22 +21,22 @@ namespace {
 
 using Vec3f = Eigen::Vector3f;
 
-const int kLeastPixels = 500;
-const int kMostSamples = 40000;
+const int kMinPixels = 500;
+const int kMaxSamples = 40000;
 // Deviation of the light's place from the camera that is expected: it shines from the tip of the scope. How far in
 // front it stands and how bright tissue is look nearly the same.
 const Eigen::Array3d kLightNear_mm(15, 15, 2);
-const double kOutlier = 0.35;        // of log albedo
-const float kLeastCosine = 0.15f;    // of light that grazes nothing is learned
-const float kSaturated = 2.0f;       // of light; such a pixel says only that it is bright
-const float kHighlightShare = 0.3f;  // of a pixel's light, from where on it is filled in
+const double kOutlier = 0.35;           // of log albedo
+const float kMinCosine = 0.15f;         // of light that grazes nothing is learned
+const float kSaturated = 2.0f;          // of light; such a pixel says only that it is bright
+const float kHighlightFraction = 0.3f;  // of a pixel's light, from where on it is filled in
 
 const float kDarkest = 0.003f, kBrightest = 0.9f;  // albedo
 
 // A pixel that shows the surface.
 struct Seen {
   int x, y;
-  Vec3f point_mm, normal, to_eye;
+  Vec3f point_mm, normal, to_camera;
   Vec3f bgr;  // light
 };
 
@@ -59,7 +60,7 @@ std::vector<Seen> look_at(const cv::Mat& bgr, const Camera& camera, const Surfac
       const auto normal_at = [&](size_t k) -> Vec3f { return normals[static_cast<size_t>(t[k])].cast<float>(); };
       Seen seen{x, y, hit.length * direction, {}, -direction.normalized(), {}};
       seen.normal = ((1 - hit.u - hit.v) * normal_at(0) + hit.u * normal_at(1) + hit.v * normal_at(2)).normalized();
-      if (seen.normal.dot(seen.to_eye) < 0) seen.normal = -seen.normal;
+      if (seen.normal.dot(seen.to_camera) < 0) seen.normal = -seen.normal;
       const auto& level = bgr.at<cv::Vec3b>(y, x);
       for (int c = 0; c < 3; ++c) seen.bgr[c] = light_from_level(level[c]);
       rows[static_cast<size_t>(y)].push_back(seen);
@@ -92,8 +93,7 @@ Vec3 fit_light(const std::vector<Seen>& samples, double reference_mm, double& sc
   {
     std::vector<double> first;
     for (const Seen& seen : samples) first.push_back(log_albedo(seen, light_mm, reference_mm));
-    std::nth_element(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(first.size() / 2), first.end());
-    level = first[first.size() / 2];
+    level = median_of(first);
   }
   const double step_mm = 0.5, count = static_cast<double>(samples.size());
   for (int iteration = 0; iteration < 40; ++iteration) {
@@ -126,26 +126,20 @@ Vec3 fit_light(const std::vector<Seen>& samples, double reference_mm, double& sc
   return light_mm;
 }
 
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // What is grey on top of the tissue's own colour, given the usual blue over red of tissue.
 float grey_part(const Seen& seen, float blue_over_red) {
   return std::max(0.0f, (seen.bgr[0] - blue_over_red * seen.bgr[2]) / (1 - blue_over_red));
 }
 
 float lobe(const Seen& seen, const Vec3f& light_mm, float roughness) {
-  return specular(seen.normal, (light_mm - seen.point_mm).normalized(), seen.to_eye, roughness * roughness, 1);
+  return specular(seen.normal, (light_mm - seen.point_mm).normalized(), seen.to_camera, roughness * roughness, 1);
 }
 
 // The lobe whose multiple is nearest to the grey part of the samples.
 void fit_gloss(const std::vector<Seen>& samples, float power, float reference_mm, float blue_over_red,
                EstimatedLook& look) {
   const Vec3f light_mm = look.light_mm.cast<float>();
-  double least = std::numeric_limits<double>::infinity();
+  double min = std::numeric_limits<double>::infinity();
   for (double roughness = 0.15; roughness < 0.9; roughness += 0.01) {
     double lobe2 = 0, lobe_grey = 0, grey2 = 0;
     for (const Seen& seen : samples) {
@@ -159,8 +153,8 @@ void fit_gloss(const std::vector<Seen>& samples, float power, float reference_mm
       grey2 += grey * grey;
     }
     const double rest = grey2 - lobe_grey * lobe_grey / std::max(1e-12, lobe2);
-    if (rest >= least) continue;
-    least = rest;
+    if (rest >= min) continue;
+    min = rest;
     look.roughness = roughness;
     look.reflectance = std::clamp(lobe_grey / std::max(1e-12, lobe2), 0.0, 1.0);
   }
@@ -190,13 +184,13 @@ void fill(cv::Mat& image, cv::Mat known) {
 EstimatedLook estimate_look(const cv::Mat& left_bgr, const Camera& left_camera, const Surface& surface,
                             const SimulatedLook& look) {
   const std::vector<Seen> all = look_at(left_bgr, left_camera, surface);
-  if (all.size() < kLeastPixels)
+  if (all.size() < kMinPixels)
     throw BadInput(
         "simulate.look.texture_from: the surface covers too little of the image; is it in mm, in the left "
         "camera frame, and of this image?");
   std::vector<Seen> samples;
-  for (size_t i = 0; i < all.size(); i += std::max<size_t>(1, all.size() / kMostSamples))
-    if (all[i].normal.dot(all[i].to_eye) > 2 * kLeastCosine) samples.push_back(all[i]);
+  for (size_t i = 0; i < all.size(); i += std::max<size_t>(1, all.size() / kMaxSamples))
+    if (all[i].normal.dot(all[i].to_camera) > 2 * kMinCosine) samples.push_back(all[i]);
 
   EstimatedLook found;
   found.light_mm = fit_light(samples, look.light.reference_mm, found.shading_scatter);
@@ -207,7 +201,7 @@ EstimatedLook estimate_look(const cv::Mat& left_bgr, const Camera& left_camera, 
     ratios.push_back(seen.bgr[0] / std::max(1e-3f, seen.bgr[2]));
     depths.push_back(seen.point_mm.z());
   }
-  const float blue_over_red = std::min(0.95f, median(ratios));
+  const float blue_over_red = std::min(0.95f, median_of(ratios));
   fit_gloss(samples, power, reference_mm, blue_over_red, found);
 
   found.albedo = cv::Mat::zeros(left_bgr.size(), CV_32FC3);
@@ -221,8 +215,8 @@ EstimatedLook estimate_look(const cv::Mat& left_bgr, const Camera& left_camera, 
     const float gloss = static_cast<float>(found.reflectance) * power * arriving *
                         lobe(seen, light_mm, static_cast<float>(found.roughness));
     const float grey = grey_part(seen, blue_over_red);
-    if (shade < kLeastCosine * arriving || seen.bgr.maxCoeff() > kSaturated ||
-        std::min(grey, 2 * gloss) > kHighlightShare * seen.bgr.maxCoeff())
+    if (shade < kMinCosine * arriving || seen.bgr.maxCoeff() > kSaturated ||
+        std::min(grey, 2 * gloss) > kHighlightFraction * seen.bgr.maxCoeff())
       continue;
     const Vec3f albedo = (seen.bgr.array() - std::min(grey, gloss)).matrix() / (power * shade);
     for (int c = 0; c < 3; ++c) found.albedo.at<cv::Vec3f>(seen.y, seen.x)[c] = std::max(kDarkest, albedo[c]);
@@ -234,7 +228,7 @@ EstimatedLook estimate_look(const cv::Mat& left_bgr, const Camera& left_camera, 
   std::nth_element(brightest.begin(), high, brightest.end());
   if (*high > kBrightest) found.albedo *= kBrightest / *high;
   fill(found.albedo, known);
-  found.mm_per_px = median(depths) / left_camera.K(0, 0);
+  found.mm_per_px = median_of(depths) / left_camera.K(0, 0);
   return found;
 }
 

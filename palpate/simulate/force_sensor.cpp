@@ -15,7 +15,7 @@ namespace palpate {
 namespace {
 
 const double kBeyondVideo_s = 1;
-const double kMostZero_N = 2;
+const double kMaxZero_N = 2;
 const double kLatestClock_s = 60;
 
 /// Uniform in 0..1, by number.
@@ -56,7 +56,7 @@ ForceSensor make_force_sensor(const Vec3& tool_axis, int seed) {
   sensor.clock_ahead_s = kLatestClock_s * uniform(seed, 0, 1);
   const auto turn = Eigen::AngleAxisd(2 * std::numbers::pi * uniform(seed, 0, 2), Vec3::UnitZ());
   sensor.camera_from_sensor = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), tool_axis) * turn.toRotationMatrix();
-  for (uint32_t k = 0; k < 3; ++k) sensor.zero_N[k] = kMostZero_N * (2 * uniform(seed, k, 3) - 1);
+  for (uint32_t k = 0; k < 3; ++k) sensor.zero_N[k] = kMaxZero_N * (2 * uniform(seed, k, 3) - 1);
   return sensor;
 }
 

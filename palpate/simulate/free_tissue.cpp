@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-const int kMostSteps = 20;
+const int kMaxSteps = 20;
 const double kResidual = 1e-9;  // of the largest force on a fixed node
 
 }  // namespace
@@ -19,7 +19,7 @@ Eigen::VectorXd stretch_free_tissue(TetModel& model, const Vec3& strain, const V
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(model.unknown_count());
   SparseFactor factor;
   Eigen::SparseMatrix<double> K;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const Eigen::VectorXd u = model.expand(moved), force_N = model.internal_force(u);
     const Eigen::VectorXd unbalanced_N = model.reduce(force_N);
     if (unbalanced_N.lpNorm<Eigen::Infinity>() <= kResidual * force_N.lpNorm<Eigen::Infinity>()) {

@@ -15,8 +15,8 @@ using Look = SimulatedInstrument::Look;
 const float kShaftFrom_mm = 26;  // back from the tip; before it are wrist and jaws
 const float kRib_mm = 2.2f;
 
-Colour mix(const Colour& a, const Colour& b, float share) {
-  return a + std::clamp(share, 0.0f, 1.0f) * (b - a);
+Colour mix(const Colour& a, const Colour& b, float fraction) {
+  return a + std::clamp(fraction, 0.0f, 1.0f) * (b - a);
 }
 
 // Bright metal that shows the tissue around it here and there.

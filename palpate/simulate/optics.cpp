@@ -15,13 +15,13 @@ namespace {
 const float kGreyOfSmoke = 0.35f;      // of the exposure
 const float kWisp_mm = 22;             // size of a wisp
 const float kDrift_mm_per_s = 9;       // of the wisps, to the left and up
-const float kShareOfDepth = 0.6f;      // where on its way to the tissue a ray meets them
+const float kFractionOfDepth = 0.6f;   // where on its way to the tissue a ray meets them
 const float kFarthestSmoke_mm = 2000;  // stands for where nothing is
 const int kCell_px = 8;                // wisps are smooth, so that they are known on a coarse grid
 const uint32_t kSeedOfSmoke = 40'000'000;
 
 // Density over the mean density, CV_32F, size of the image.
-cv::Mat wisps(const cv::Mat& depth_mm, const SimulatedCamera& camera, const SimulatedLook& look, const Vec3& eye_mm,
+cv::Mat wisps(const cv::Mat& depth_mm, const SimulatedCamera& camera, const SimulatedLook& look, const Vec3& camera_mm,
               double time_s) {
   const cv::Size cells((depth_mm.cols + kCell_px - 1) / kCell_px, (depth_mm.rows + kCell_px - 1) / kCell_px);
   const auto strength = static_cast<float>(look.smoke.wisps);
@@ -37,7 +37,7 @@ cv::Mat wisps(const cv::Mat& depth_mm, const SimulatedCamera& camera, const Simu
                                                                          std::min(i * kCell_px, depth_mm.cols - 1)));
       const Eigen::Vector3f ray((x - 0.5f * static_cast<float>(camera.width - 1)) / focal,
                                 (y - 0.5f * static_cast<float>(camera.height - 1)) / focal, 1);
-      const Eigen::Vector3f point = eye_mm.cast<float>() + kShareOfDepth * depth * ray - drift;
+      const Eigen::Vector3f point = camera_mm.cast<float>() + kFractionOfDepth * depth * ray - drift;
       const float swirl = fractal_noise(point / kWisp_mm, kSeedOfSmoke + static_cast<uint32_t>(look.seed), 3).value;
       coarse.at<float>(j, i) = std::max(0.0f, 1 + 2 * strength * swirl);
     }
@@ -50,9 +50,9 @@ cv::Mat wisps(const cv::Mat& depth_mm, const SimulatedCamera& camera, const Simu
 }  // namespace
 
 void add_smoke(cv::Mat& linear_bgr, const cv::Mat& depth_mm, const SimulatedCamera& camera, const SimulatedLook& look,
-               const Vec3& eye_mm, double time_s) {
+               const Vec3& camera_mm, double time_s) {
   if (look.smoke.density <= 0) return;
-  const cv::Mat relative_density = wisps(depth_mm, camera, look, eye_mm, time_s);
+  const cv::Mat relative_density = wisps(depth_mm, camera, look, camera_mm, time_s);
   const float per_mm = static_cast<float>(look.smoke.density) / 100;
   const float grey = kGreyOfSmoke * static_cast<float>(look.exposure);
   tbb::parallel_for(0, linear_bgr.rows, [&](int y) {
@@ -90,10 +90,10 @@ StereoLight woven(const StereoLight& even_field, const StereoLight& odd_field) {
 StereoFrame recorded(const StereoLight& light, const SimulatedCamera& camera, const SimulatedLook& look, int index) {
   const auto number = static_cast<uint32_t>(index);
   const auto seed = static_cast<uint32_t>(look.seed);
-  const auto through = [&](const cv::Mat& linear, uint32_t eye) {
+  const auto through = [&](const cv::Mat& linear, uint32_t side) {
     cv::Mat seen = linear.clone();
     add_border(seen, look.border);
-    return sensor_image(seen, look.noise, hash_bits(number, eye, 0, seed));
+    return sensor_image(seen, look.noise, hash_bits(number, side, 0, seed));
   };
   StereoFrame frame;
   frame.index = index;

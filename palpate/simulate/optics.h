@@ -7,17 +7,17 @@
 
 namespace palpate {
 
-/// Light that arrives at both eyes, before scope and sensor: linear BGR (CV_32FC3, 1 = white). `left_depth_mm` is
-/// CV_32F: depth along the optical axis at the pixel centres of the left eye, infinite where nothing is.
+/// Light that arrives at both cameras, before scope and sensor: linear BGR (CV_32FC3, 1 = white). `left_depth_mm` is
+/// CV_32F: depth along the optical axis at the pixel centres of the left camera, infinite where nothing is.
 struct StereoLight {
   cv::Mat left, right, left_depth_mm;
 };
 
 /// Smoke in the cavity: light is lost on its way and grey light is added, c' = t c + (1 - t) grey with
 /// t = exp(-density depth / 100 mm) (Koschmieder). Wisps are a field in space that drifts with time, the same for both
-/// eyes. `eye_mm`: place of the eye.
+/// cameras. `eye_mm`: place of the camera.
 void add_smoke(cv::Mat& linear_bgr, const cv::Mat& depth_mm, const SimulatedCamera& camera, const SimulatedLook& look,
-               const Vec3& eye_mm, double time_s);
+               const Vec3& camera_mm, double time_s);
 
 /// Dark outside the round field of view of the scope, blurred at its edge.
 void add_border(cv::Mat& linear_bgr, const SimulatedBorder& border);

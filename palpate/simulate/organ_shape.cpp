@@ -69,13 +69,13 @@ Vec3 slab_point(const Vec3& direction) {
 }
 
 void fit_to_box(std::vector<Vec3>& points, const Vec3& size) {
-  Vec3 least = points.front(), most = points.front();
+  Vec3 min = points.front(), max = points.front();
   for (const Vec3& point : points) {
-    least = least.cwiseMin(point);
-    most = most.cwiseMax(point);
+    min = min.cwiseMin(point);
+    max = max.cwiseMax(point);
   }
-  const Vec3 scale = size.cwiseQuotient(most - least);
-  for (Vec3& point : points) point = (point - (least + most) / 2).cwiseProduct(scale);
+  const Vec3 scale = size.cwiseQuotient(max - min);
+  for (Vec3& point : points) point = (point - (min + max) / 2).cwiseProduct(scale);
 }
 
 }  // namespace
@@ -96,14 +96,14 @@ Surface make_sphere(int subdivisions) {
   return sphere;
 }
 
-Surface make_organ(const SimulatedBody& body, int least_triangles) {
+Surface make_organ(const SimulatedBody& body, int min_triangles) {
   if (body.shape.has_extension()) {
     Surface organ = read_body(body.shape, LengthUnit::mm);
-    while (static_cast<int>(organ.triangles.size()) < least_triangles) organ = subdivided(organ);
+    while (static_cast<int>(organ.triangles.size()) < min_triangles) organ = subdivided(organ);
     return organ;
   }
   int subdivisions = 0;
-  while (20 << (2 * subdivisions) < least_triangles) ++subdivisions;
+  while (20 << (2 * subdivisions) < min_triangles) ++subdivisions;
   Surface organ = make_sphere(subdivisions);
   for (Vec3& vertex : organ.vertices_mm)
     vertex = body.shape == "slab"    ? slab_point(vertex)

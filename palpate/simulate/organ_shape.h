@@ -7,7 +7,7 @@ namespace palpate {
 /// Closed surface of the organ at rest, left camera frame, oriented outwards, edge-manifold, with at least
 /// `least_triangles`. The box of the named shapes measures exactly `size_mm` before they are turned.
 /// Throws BadInput when a file cannot be used.
-Surface make_organ(const SimulatedBody& body, int least_triangles);
+Surface make_organ(const SimulatedBody& body, int min_triangles);
 
 /// Turn of the body by its `rotation_deg`.
 Mat3 left_from_body(const SimulatedBody& body);

@@ -14,9 +14,9 @@
 namespace palpate {
 namespace {
 
-const int kMostSlips = 30;           // corrections of one move
+const int kMaxSlips = 30;            // corrections of one move
 const double kConeTolerance = 1e-3;  // of the coefficient of friction
-const double kLeastSlip_mm = 1e-4;
+const double kMinSlip_mm = 1e-4;
 const double kSamplesPerEdge = 0.8;  // sparser than the nodes, so that no two samples say the same
 const double kGrowthPerEdge = 0.4;   // by so much of an edge tied samples act as a larger disc (see make_footprint)
 const double kJustTouching_mm = 1e-9;
@@ -28,7 +28,7 @@ const Vec3& at(const std::vector<Vec3>& values, int i) {
 // Where a line along the normal meets the outer side of the surface, nearest to the point.
 std::optional<Footprint::Sample> sample_along(const TruthBody& body, const Vec3& point, const Vec3& normal) {
   std::optional<Footprint::Sample> nearest;
-  double least = std::numeric_limits<double>::infinity();
+  double min = std::numeric_limits<double>::infinity();
   for (const Triangle& t : body.boundary) {
     const Vec3& a = at(body.mesh.nodes_mm, t[0]);
     const Vec3 ab = at(body.mesh.nodes_mm, t[1]) - a, ac = at(body.mesh.nodes_mm, t[2]) - a;
@@ -36,12 +36,12 @@ std::optional<Footprint::Sample> sample_along(const TruthBody& body, const Vec3&
     const double slope = area.dot(normal);
     if (slope <= 0) continue;
     const double height = area.dot(a - point) / slope;
-    if (std::abs(height) >= least) continue;
+    if (std::abs(height) >= min) continue;
     const Vec3 offset = point + height * normal - a;
     const double v = offset.cross(ac).dot(area) / area.squaredNorm();
     const double w = ab.cross(offset).dot(area) / area.squaredNorm();
     if (v < -1e-9 || w < -1e-9 || v + w > 1 + 1e-9) continue;
-    least = std::abs(height);
+    min = std::abs(height);
     nearest = Footprint::Sample{t, Vec3(1 - v - w, v, w)};
   }
   return nearest;
@@ -126,7 +126,7 @@ PushedTissue::Answer PushedTissue::move(const Vec3& displacement_mm) {
     return answer;
   }
   if (!touching_) hold(along_tangents(displacement_mm));
-  for (int correction = 0; correction < kMostSlips; ++correction) {
+  for (int correction = 0; correction < kMaxSlips; ++correction) {
     const Vec3 p_mm = tip_mm - disc_.center_mm;
     answer.equilibrium = solver_.solve(p_mm);
     if (!answer.equilibrium.converged) break;
@@ -140,7 +140,7 @@ PushedTissue::Answer PushedTissue::move(const Vec3& displacement_mm) {
     const double beyond = tangential_N / std::max(normal_N, 1e-12) - friction_;
     if (answer.slid ? std::abs(beyond) < kConeTolerance : beyond < kConeTolerance) break;
     const Eigen::Vector2d slip_mm = (1 - friction_ * normal_N / tangential_N) * along_tangents(p_mm);
-    if (slip_mm.norm() < kLeastSlip_mm) break;
+    if (slip_mm.norm() < kMinSlip_mm) break;
     answer.slid = true;
     hold(place_mm_ + slip_mm);
   }

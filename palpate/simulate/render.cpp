@@ -61,7 +61,7 @@ struct Renderer::Scene {
   RayScene rays;
   std::vector<DrawnSurface> surfaces;
 
-  Vec3f eye_mm(int eye) const { return {eye == 0 ? 0.0f : static_cast<float>(camera.baseline_mm), 0, 0}; }
+  Vec3f camera_mm(int side) const { return {side == 0 ? 0.0f : static_cast<float>(camera.baseline_mm), 0, 0}; }
 
   // Along the optical axis 1, so that a ray's length is its depth.
   Vec3f ray_direction(float x_px, float y_px) const {
@@ -77,15 +77,15 @@ struct Renderer::Scene {
     return light_mm + Vec3f(r * std::cos(angle), r * std::sin(angle), 0);
   }
 
-  // Light that leaves a point towards the eye, apart from what stands between it and the light.
-  Lit light_up(const RayHit& hit, const BakedTexture::Spot& spot, const Vec3f& point, const Vec3f& to_eye,
+  // Light that leaves a point towards the camera, apart from what stands between it and the light.
+  Lit light_up(const RayHit& hit, const BakedTexture::Spot& spot, const Vec3f& point, const Vec3f& to_camera,
                uint32_t bits) const {
     const DrawnSurface& surface = surfaces[static_cast<size_t>(hit.surface)];
     const Triangle& triangle = surface.triangles[static_cast<size_t>(hit.triangle)];
     const auto normal_at = [&](size_t k) -> const Vec3f& { return surface.normals[static_cast<size_t>(triangle[k])]; };
     Vec3f smooth = (1 - hit.u - hit.v) * normal_at(0) + hit.u * normal_at(1) + hit.v * normal_at(2);
     smooth.normalize();
-    if (smooth.dot(to_eye) < 0) smooth = -smooth;
+    if (smooth.dot(to_camera) < 0) smooth = -smooth;
     const Texel texel = spot.texel();
     const Vec3f normal = (smooth - texel.slope + smooth * smooth.dot(texel.slope)).normalized();
 
@@ -102,13 +102,13 @@ struct Renderer::Scene {
     if (cosine <= 0 || smooth.dot(to_light) <= 0) return lit;
     lit.faces_light = true;
     lit.direct = arriving * cosine * texel.albedo;
-    lit.direct.array() += arriving * specular(normal, to_light, to_eye, surface.alpha, surface.reflectance);
+    lit.direct.array() += arriving * specular(normal, to_light, to_camera, surface.alpha, surface.reflectance);
     return lit;
   }
 
-  void sample(int eye, const Bundle<float>& x_px, const Bundle<float>& y_px, uint32_t frame,
+  void sample(int side, const Bundle<float>& x_px, const Bundle<float>& y_px, uint32_t frame,
               Bundle<Sample>& samples) const {
-    const Vec3f origin = eye_mm(eye);
+    const Vec3f origin = camera_mm(side);
     Bundle<Vec3f> directions, from, to;
     for (size_t i = 0; i < kBundle; ++i) directions[i] = ray_direction(x_px[i], y_px[i]);
     Bundle<RayHit> hits;
@@ -123,7 +123,7 @@ struct Renderer::Scene {
     for (size_t i = 0; i < kBundle; ++i) {
       if (hits[i].surface >= 0) {
         const auto eighths = [](float px) { return static_cast<uint32_t>(static_cast<int>(std::lround(8 * px))); };
-        const uint32_t bits = hash_bits(eighths(x_px[i]), eighths(y_px[i]), 2 * frame + static_cast<uint32_t>(eye),
+        const uint32_t bits = hash_bits(eighths(x_px[i]), eighths(y_px[i]), 2 * frame + static_cast<uint32_t>(side),
                                         static_cast<uint32_t>(look.seed));
         lit[i] =
             light_up(hits[i], spots[i], origin + hits[i].length * directions[i], -directions[i].normalized(), bits);
@@ -142,19 +142,19 @@ struct Renderer::Scene {
   }
 
   // Samples at x = first_x, first_x + 1, ...
-  void sample_row(int eye, float first_x, float y, uint32_t frame, Sample* samples, int count) const {
+  void sample_row(int side, float first_x, float y, uint32_t frame, Sample* samples, int count) const {
     Bundle<float> x_px, y_px;
     Bundle<Sample> bundle;
     y_px.fill(y);
     for (int start = 0; start < count; start += kBundle) {
       for (int i = 0; i < kBundle; ++i) x_px[static_cast<size_t>(i)] = first_x + static_cast<float>(start + i);
-      sample(eye, x_px, y_px, frame, bundle);
+      sample(side, x_px, y_px, frame, bundle);
       std::copy_n(bundle.begin(), std::min(kBundle, count - start), samples + start);
     }
   }
 
   // Middle and corners of a pixel belong to one smooth surface: their mean. Where surfaces meet: many samples.
-  Vec3f pixel_colour(int eye, int x, int y, uint32_t frame, const Sample& middle,
+  Vec3f pixel_colour(int side, int x, int y, uint32_t frame, const Sample& middle,
                      const std::array<const Sample*, 4>& corners) const {
     bool smooth = true;
     for (const Sample* corner : corners) smooth = smooth && belong_together(middle, *corner);
@@ -169,27 +169,27 @@ struct Renderer::Scene {
       x_px[static_cast<size_t>(i)] = static_cast<float>(x) + (static_cast<float>(i % 4) + 0.5f) / 4 - 0.5f;
       y_px[static_cast<size_t>(i)] = static_cast<float>(y) + (static_cast<float>(i / 4) + 0.5f) / 4 - 0.5f;
     }
-    sample(eye, x_px, y_px, frame, samples);
+    sample(side, x_px, y_px, frame, samples);
     for (const Sample& part : samples) sum += part.colour.cwiseMin(kBrightest) / kBundle;
     return sum;
   }
 
-  cv::Mat draw(int eye, uint32_t frame, cv::Mat& depth_mm) const {
+  cv::Mat draw(int side, uint32_t frame, cv::Mat& depth_mm) const {
     const int width = camera.width, height = camera.height;
     const auto corner_columns = static_cast<size_t>(width) + 1;
     std::vector<Sample> corners(corner_columns * (static_cast<size_t>(height) + 1));
     tbb::parallel_for(0, height + 1, [&](int y) {
-      sample_row(eye, -0.5f, static_cast<float>(y) - 0.5f, frame, &corners[static_cast<size_t>(y) * corner_columns],
+      sample_row(side, -0.5f, static_cast<float>(y) - 0.5f, frame, &corners[static_cast<size_t>(y) * corner_columns],
                  width + 1);
     });
     cv::Mat linear(height, width, CV_32FC3);
     depth_mm.create(height, width, CV_32F);
     tbb::parallel_for(0, height, [&](int y) {
       std::vector<Sample> middles(static_cast<size_t>(width));
-      sample_row(eye, 0, static_cast<float>(y), frame, middles.data(), width);
+      sample_row(side, 0, static_cast<float>(y), frame, middles.data(), width);
       for (int x = 0; x < width; ++x) {
         const Sample* corner = &corners[static_cast<size_t>(y) * corner_columns + static_cast<size_t>(x)];
-        const Vec3f rgb = pixel_colour(eye, x, y, frame, middles[static_cast<size_t>(x)],
+        const Vec3f rgb = pixel_colour(side, x, y, frame, middles[static_cast<size_t>(x)],
                                        {corner, corner + 1, corner + corner_columns, corner + corner_columns + 1});
         linear.at<cv::Vec3f>(y, x) = {rgb.z(), rgb.y(), rgb.x()};
         depth_mm.at<float>(y, x) = middles[static_cast<size_t>(x)].depth_mm;
@@ -235,9 +235,9 @@ StereoLight Renderer::light(int index, double time_s) {
   cv::Mat right_depth_mm;
   light.left = scene_->draw(0, number, light.left_depth_mm);
   light.right = scene_->draw(1, number, right_depth_mm);
-  const auto eye_mm = [this](int eye) -> Vec3 { return scene_->eye_mm(eye).cast<double>(); };
-  add_smoke(light.left, light.left_depth_mm, scene_->camera, scene_->look, eye_mm(0), time_s);
-  add_smoke(light.right, right_depth_mm, scene_->camera, scene_->look, eye_mm(1), time_s);
+  const auto camera_mm = [this](int side) -> Vec3 { return scene_->camera_mm(side).cast<double>(); };
+  add_smoke(light.left, light.left_depth_mm, scene_->camera, scene_->look, camera_mm(0), time_s);
+  add_smoke(light.right, right_depth_mm, scene_->camera, scene_->look, camera_mm(1), time_s);
   return light;
 }
 
@@ -245,13 +245,13 @@ StereoFrame Renderer::render(int index) {
   return recorded(light(index, index / scene_->camera.fps), scene_->camera, scene_->look, index);
 }
 
-cv::Mat Renderer::visible_mask(int surface, int eye) {
+cv::Mat Renderer::visible_mask(int surface, int side) {
   scene_->rays.commit();
   cv::Mat mask(scene_->camera.height, scene_->camera.width, CV_8U, cv::Scalar(0));
   tbb::parallel_for(0, mask.rows, [&](int y) {
     for (int x = 0; x < mask.cols; ++x) {
       const Vec3f direction = scene_->ray_direction(static_cast<float>(x), static_cast<float>(y));
-      if (scene_->rays.first_hit(scene_->eye_mm(eye), direction).surface == surface) mask.at<uchar>(y, x) = 255;
+      if (scene_->rays.first_hit(scene_->camera_mm(side), direction).surface == surface) mask.at<uchar>(y, x) = 255;
     }
   });
   return mask;

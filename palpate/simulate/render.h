@@ -17,7 +17,7 @@ struct SurfaceLook {
   double reflectance = 0.04;  ///< at normal incidence
 };
 
-/// Draws surfaces for both eyes with a light near the camera (Embree). Left camera frame. Keeps the ray tracing tree
+/// Draws surfaces for both cameras with a light near the camera (Embree). Left camera frame. Keeps the ray tracing tree
 /// and the sampled textures; textures stick to the rest shape and move with the surface.
 class Renderer {
  public:
@@ -31,15 +31,15 @@ class Renderer {
   /// New places of all vertices of a surface.
   void move(int surface, const std::vector<Vec3>& vertices_mm);
 
-  /// Light that arrives at both eyes at a moment, with anti-aliasing and smoke. The same for any number of threads;
+  /// Light that arrives at both cameras at a moment, with anti-aliasing and smoke. The same for any number of threads;
   /// `index` is the frame and seeds the points of the light that cast shadows.
   StereoLight light(int index, double time_s);
 
   /// Both images of a frame as recorded, 8-bit BGR.
   StereoFrame render(int index);
 
-  /// 255 where an eye (0 left, 1 right) sees this surface before all others.
-  cv::Mat visible_mask(int surface, int eye = 0);
+  /// 255 where an camera (0 left, 1 right) sees this surface before all others.
+  cv::Mat visible_mask(int surface, int side = 0);
 
  private:
   struct Scene;

@@ -9,12 +9,12 @@ namespace palpate {
 /// Outgoing over incoming light of a rough specular lobe (Trowbridge-Reitz, "GGX", with Smith's masking and Schlick's
 /// Fresnel term), times pi and the cosine at the light, so that it adds to albedo times cosine. Unit vectors;
 /// `reflectance` at normal incidence.
-inline float specular(const Eigen::Vector3f& n, const Eigen::Vector3f& to_light, const Eigen::Vector3f& to_eye,
+inline float specular(const Eigen::Vector3f& n, const Eigen::Vector3f& to_light, const Eigen::Vector3f& to_camera,
                       float alpha, float reflectance) {
-  const float n_l = n.dot(to_light), n_v = std::max(1e-3f, n.dot(to_eye));
+  const float n_l = n.dot(to_light), n_v = std::max(1e-3f, n.dot(to_camera));
   if (n_l <= 0) return 0;
-  const Eigen::Vector3f half = (to_light + to_eye).normalized();
-  const float n_h = std::max(0.0f, n.dot(half)), v_h = std::max(0.0f, to_eye.dot(half));
+  const Eigen::Vector3f half = (to_light + to_camera).normalized();
+  const float n_h = std::max(0.0f, n.dot(half)), v_h = std::max(0.0f, to_camera.dot(half));
   const float a2 = alpha * alpha;
   const float d = n_h * n_h * (a2 - 1) + 1;
   const float distribution = a2 / (d * d);

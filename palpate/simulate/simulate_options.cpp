@@ -44,7 +44,7 @@ void describe_body(Settings& settings, SimulatedBody& body) {
 
 void describe_light(Settings& settings, SimulatedLight& light) {
   settings.vector3("position_mm", light.position_mm, {-kLargest_mm, kLargest_mm},
-                   "place of the light, measured from the middle between the eyes, mm");
+                   "place of the light, measured from the middle between the cameras, mm");
   settings.number("radius_mm", light.radius_mm, {0, 100}, "radius of the light, softens shadows, mm");
   settings.number("reference_mm", light.reference_mm, {0, kLargest_mm, true},
                   "distance at which a white surface that faces the light is just white, mm");
@@ -79,7 +79,7 @@ void describe_smoke(Settings& settings, SimulatedSmoke& smoke) {
 }
 
 void describe_blood(Settings& settings, SimulatedBlood& blood) {
-  settings.number("covered", blood.covered, {0, 0.9}, "share of the organ under patches of blood");
+  settings.number("covered", blood.covered, {0, 0.9}, "fraction of the organ under patches of blood");
   settings.number("patch_mm", blood.patch_mm, {0, 100, true}, "size of a patch, mm");
 }
 
@@ -119,7 +119,7 @@ void describe_camera(Settings& settings, SimulatedCamera& camera) {
   settings.integer("width", camera.width, {64, 8192}, "of one image, px");
   settings.integer("height", camera.height, {64, 8192}, "of one image, px");
   settings.number("focal_px", camera.focal_px, {10, 100000}, "focal length, px");
-  settings.number("baseline_mm", camera.baseline_mm, {1, 200}, "distance between the eyes, mm");
+  settings.number("baseline_mm", camera.baseline_mm, {1, 200}, "distance between the cameras, mm");
   settings.number("fps", camera.fps, {1, 1000}, "frames per second");
   settings.group("pan", "both cameras move while patient and trocar stand; truth.csv is in the moving camera's frame",
                  [&camera](Settings& s) { describe_pan(s, camera.pan); });
@@ -144,7 +144,7 @@ void describe_instrument(Settings& settings, SimulatedInstrument& instrument) {
        {"blue_tube", Look::blue_tube}},
       "steel all over; a dark-grey ribbed shaft with a bright wrist and jaws that reflect the tissue's red; "
       "white with a steel end; a bluish-white tube with holes");
-  settings.number("blood", instrument.blood, {0, 0.9}, "share of it that is smeared with blood");
+  settings.number("blood", instrument.blood, {0, 0.9}, "fraction of it that is smeared with blood");
   settings.number("shaft_mm", instrument.shaft_mm, {1, 20}, "diameter of the shaft, mm");
   settings.vector3("enters_from", instrument.enters_from, {-kLargest_mm, kLargest_mm},
                    "point that the shaft always passes through, left camera frame, mm");
@@ -231,7 +231,7 @@ void describe_truth(Settings& settings, SimulatedTruth& truth) {
 void describe_files(Settings& settings, SimulatedFiles& files) {
   settings.flag("surface", files.surface, "surface/frame_0000.ply ...: the organ in each frame, left camera frame, mm");
   settings.flag("depth", files.depth,
-                "depth/left_0000.png ...: what the left eye sees, 16 bit, in hundredths of a millimetre along the "
+                "depth/left_0000.png ...: what the left camera sees, 16 bit, in hundredths of a millimetre along the "
                 "optical axis, 0 = nothing");
   settings.flag("sensor", files.sensor,
                 "sensor.csv: what a force sensor logs (100 Hz, its own clock, axes of the tool, an offset, noise); "
@@ -246,7 +246,7 @@ void describe_files(Settings& settings, SimulatedFiles& files) {
 void describe(Settings& settings, SimulateOptions& options) {
   settings.group("body", "the organ at rest", [&](Settings& s) { describe_body(s, options.body); });
   settings.group("look", "what it looks like", [&](Settings& s) { describe_look(s, options.look); });
-  settings.group("camera", "both eyes", [&](Settings& s) { describe_camera(s, options.camera); });
+  settings.group("camera", "both cameras", [&](Settings& s) { describe_camera(s, options.camera); });
   settings.group("instrument", "what touches the tissue",
                  [&](Settings& s) { describe_instrument(s, options.instrument); });
   settings.group("breathing", "organ and background move by motion_mm (1 - cos(2 pi t / period_s)) / 2",

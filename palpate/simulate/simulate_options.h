@@ -18,7 +18,7 @@ struct SimulatedBody {
 };
 
 struct SimulatedLight {
-  Vec3 position_mm = Vec3(-5, -7, 0);  ///< from the middle between the eyes
+  Vec3 position_mm = Vec3(-5, -7, 0);  ///< from the middle between the cameras
   double radius_mm = 1.5;              ///< of the disc that shines; softens shadows
   double reference_mm = 105;           ///< a white surface at this distance, facing the light, is just white
 };
@@ -47,7 +47,7 @@ struct SimulatedSmoke {
 };
 
 struct SimulatedBlood {
-  double covered = 0;    ///< share of the organ
+  double covered = 0;    ///< fraction of the organ
   double patch_mm = 10;  ///< size of a patch
 };
 
@@ -75,7 +75,7 @@ struct SimulatedPan {
   double during_s = 2;
 };
 
-/// `simulate.camera`: both eyes alike, parallel, no distortion, principal point in the middle of the image.
+/// `simulate.camera`: both cameras alike, parallel, no distortion, principal point in the middle of the image.
 struct SimulatedCamera {
   int width = 960;
   int height = 540;
@@ -89,7 +89,7 @@ struct SimulatedCamera {
 struct SimulatedInstrument {
   enum class Model { grasper, probe, hook } model = Model::grasper;
   enum class Look { steel, dark_ribbed, white_ceramic, blue_tube } look = Look::steel;
-  double blood = 0;                      ///< share of it that is smeared
+  double blood = 0;                      ///< fraction of it that is smeared
   double shaft_mm = 6.4;                 ///< diameter
   Vec3 enters_from = Vec3(130, 25, 20);  ///< the shaft always passes through this point
   double free_distance_mm = 48;          ///< how far from the contact the tip begins and ends, along the shaft

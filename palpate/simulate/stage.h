@@ -12,7 +12,7 @@ class Stage {
   /// from cannot be read.
   Stage(const SimulateOptions& options, const Surface& organ, const TruthBody& truth, const Moment& first);
 
-  /// 255 where the left eye sees the organ before all others.
+  /// 255 where the left camera sees the organ before all others.
   cv::Mat organ_mask() { return renderer_.visible_mask(organ_number_); }
 
   /// Puts everything in place.

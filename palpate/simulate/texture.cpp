@@ -21,8 +21,8 @@ float smooth_step(float from, float to, float x) {
   return t * t * (3 - 2 * t);
 }
 
-Colour mix(const Colour& a, const Colour& b, float share) {
-  return a + share * (b - a);
+Colour mix(const Colour& a, const Colour& b, float fraction) {
+  return a + fraction * (b - a);
 }
 
 // Thin branching lines: where a warped noise crosses zero, thicker and thinner, interrupted. 0 none .. 1 in a vessel.
@@ -128,7 +128,7 @@ Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed_numbe
   const uint32_t seed = 1000u * static_cast<uint32_t>(seed_number) + 700u;
   const auto size_mm = static_cast<float>(blood.patch_mm);
   const auto pooled = [seed, size_mm](const Eigen::Vector3f& p) { return fractal_noise(p / size_mm, seed, 3).value; };
-  // The level that the stated share of space lies above.
+  // The level that the stated fraction of space lies above.
   std::vector<float> levels(kLevelSamples);
   for (uint32_t i = 0; i < kLevelSamples; ++i) {
     const auto anywhere = [&](uint32_t axis) { return 60 * size_mm * unit_from_bits(hash_bits(i, axis, 9, seed)); };
@@ -139,9 +139,9 @@ Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed_numbe
   const float level = levels[static_cast<size_t>(dry)];
   return [clean, pooled, level](const Vec3& rest_mm, const Vec3& normal) {
     Texel texel = clean(rest_mm, normal);
-    const float share = smooth_step(level - 0.03f, level + 0.03f, pooled(rest_mm.cast<float>()));
-    texel.albedo = mix(texel.albedo, {0.17f, 0.008f, 0.006f}, 0.93f * share);
-    texel.slope *= 1 - 0.8f * share;
+    const float fraction = smooth_step(level - 0.03f, level + 0.03f, pooled(rest_mm.cast<float>()));
+    texel.albedo = mix(texel.albedo, {0.17f, 0.008f, 0.006f}, 0.93f * fraction);
+    texel.slope *= 1 - 0.8f * fraction;
     return texel;
   };
 }

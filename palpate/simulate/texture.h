@@ -25,7 +25,7 @@ Texture tissue_texture(const SimulatedLook& look);
 /// one.
 Texture image_texture(const cv::Mat& linear_bgr, double mm_per_px, int seed);
 
-/// The same with patches of blood: dark, with less relief, their share of space as told.
+/// The same with patches of blood: dark, with less relief, their fraction of space as told.
 Texture bloody(const Texture& clean, const SimulatedBlood& blood, int seed);
 
 /// The wall of the cavity behind the organ: darker, browner, fat and vessels.

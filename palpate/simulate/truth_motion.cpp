@@ -56,7 +56,7 @@ class HeldTissue {
   void leave(size_t tip) {
     if (!holds(tip)) return;
     const auto place = std::find(held_.begin(), held_.end(), tip);
-    solver_.let_go(static_cast<size_t>(place - held_.begin()));
+    solver_.release(static_cast<size_t>(place - held_.begin()));
     held_.erase(place);
   }
 
@@ -160,8 +160,8 @@ void check_equilibrium(const Equilibrium& equilibrium, double time_s, const Vec3
 
 }  // namespace
 
-cv::Point2d project(const SimulatedCamera& camera, const Vec3& point, double eye_x_mm) {
-  return {camera.focal_px * (point.x() - eye_x_mm) / point.z() + 0.5 * (camera.width - 1),
+cv::Point2d project(const SimulatedCamera& camera, const Vec3& point, double camera_x_mm) {
+  return {camera.focal_px * (point.x() - camera_x_mm) / point.z() + 0.5 * (camera.width - 1),
           camera.focal_px * point.y() / point.z() + 0.5 * (camera.height - 1)};
 }
 

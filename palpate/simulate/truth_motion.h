@@ -17,7 +17,7 @@ struct TouchPoint {
   Mat3 axes;
 };
 
-/// The point of the organ that the left eye sees at `at_px`. Throws BadInput when it sees none there.
+/// The point of the organ that the left camera sees at `at_px`. Throws BadInput when it sees none there.
 TouchPoint find_touch_point(const Surface& organ, const SimulatedCamera& camera, cv::Point2d at_px);
 
 /// Everything that is known at one moment before a picture is drawn.
@@ -49,7 +49,7 @@ std::vector<Moment> solve_motion(const SimulateOptions& options, const TissueOpt
                                  const std::vector<TouchPoint>& touches, double friction, int frames,
                                  MotionQuality& quality, const std::function<void()>& step);
 
-/// Pixel of an eye at (eye_x_mm, 0, 0), parallel to the left one, without distortion.
-cv::Point2d project(const SimulatedCamera& camera, const Vec3& point_mm, double eye_x_mm);
+/// Pixel of an camera at (eye_x_mm, 0, 0), parallel to the left one, without distortion.
+cv::Point2d project(const SimulatedCamera& camera, const Vec3& point_mm, double camera_x_mm);
 
 }  // namespace palpate

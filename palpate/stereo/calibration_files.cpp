@@ -14,7 +14,6 @@ namespace palpate {
 namespace {
 
 using Role = CalibrationRole;
-using Eye = CalibrationEye;
 using Numbers = std::vector<double>;
 
 std::string small(std::string text) {
@@ -49,7 +48,7 @@ void sort_in(Calibration& calibration) {
       throw BadInput(fmt::format("{}: {} is [{:.6g}], expected finite numbers", calibration.file.string(), entry.path,
                                  fmt::join(entry.numbers, ", ")));
     calibration.by_matlab = calibration.by_matlab || small(entry.path).find("cameraparameters") != std::string::npos;
-    Said& said = calibration.of(value.eye);
+    Said& said = calibration.of(value.camera);
     if (value.role == Role::coefficient) {
       require_one_set(calibration, value, said);
       said.coefficients.emplace(value.name, entry.numbers.front());
@@ -75,10 +74,10 @@ bool has_camera(const Said& said) {
          said.find(Role::focal) || said.coefficients.count("fx");
 }
 bool has_pose(const Calibration& calibration) {
-  for (const Eye eye : {Eye::unknown, Eye::right})
+  for (const CameraSide camera : {CameraSide::unknown, CameraSide::right})
     for (const Role role : {Role::translation, Role::transform})
-      if (calibration.of(eye).find(role)) return true;
-  return calibration.of(Eye::unknown).coefficients.count("baseline") > 0;
+      if (calibration.of(camera).find(role)) return true;
+  return calibration.of(CameraSide::unknown).coefficients.count("baseline") > 0;
 }
 
 /// The same name with one word exchanged for another, in the same capitals; nothing where the word is not in it or no
@@ -105,9 +104,10 @@ std::optional<std::filesystem::path> first_there(const std::filesystem::path& fi
 
 /// Of what one file lacks, the other one gives.
 void add_what_is_missing(Calibration& calibration, const Calibration& other) {
-  for (size_t eye = 0; eye < calibration.said.size(); ++eye) {
-    calibration.said[eye].values.insert(other.said[eye].values.begin(), other.said[eye].values.end());
-    calibration.said[eye].coefficients.insert(other.said[eye].coefficients.begin(), other.said[eye].coefficients.end());
+  for (size_t camera = 0; camera < calibration.said.size(); ++camera) {
+    calibration.said[camera].values.insert(other.said[camera].values.begin(), other.said[camera].values.end());
+    calibration.said[camera].coefficients.insert(other.said[camera].coefficients.begin(),
+                                                 other.said[camera].coefficients.end());
   }
 }
 
@@ -118,12 +118,12 @@ void refuse(const Calibration& calibration, const std::string& why) {
 }
 
 bool both_have(const Calibration& calibration, Role role) {
-  return calibration.of(Eye::left).find(role) && calibration.of(Eye::right).find(role);
+  return calibration.of(CameraSide::left).find(role) && calibration.of(CameraSide::right).find(role);
 }
 
 cv::Size image_size_of(const Calibration& calibration) {
-  for (const Eye eye : {Eye::unknown, Eye::left}) {
-    const Said& said = calibration.of(eye);
+  for (const CameraSide camera : {CameraSide::unknown, CameraSide::left}) {
+    const Said& said = calibration.of(camera);
     const double width = said.coefficient("width"), height = said.coefficient("height");
     if (width > 0 && height > 0 && width < 1e5 && height < 1e5) return cv::Size(cvRound(width), cvRound(height));
     if (const Numbers* size = said.find(Role::image_size);
@@ -148,9 +148,10 @@ Calibration whole_calibration(const std::filesystem::path& file) {
     sort_in(calibration);
     return calibration;
   }
-  const bool has_left = has_camera(calibration.of(Eye::left)), has_right = has_camera(calibration.of(Eye::right));
-  const bool only_camera = !has_left && !has_right && has_camera(calibration.of(Eye::unknown)) &&
-                           !calibration.of(Eye::unknown).coefficients.count("baseline");
+  const bool has_left = has_camera(calibration.of(CameraSide::left)),
+             has_right = has_camera(calibration.of(CameraSide::right));
+  const bool only_camera = !has_left && !has_right && has_camera(calibration.of(CameraSide::unknown)) &&
+                           !calibration.of(CameraSide::unknown).coefficients.count("baseline");
   if (only_camera) {
     const std::vector<std::pair<std::string, std::string>> names = {
         {"left", "right"}, {"cam0", "cam1"}, {"camera0", "camera1"}, {"_l", "_r"}, {"_0", "_1"}, {"cam1", "cam2"}};
@@ -166,11 +167,11 @@ Calibration whole_calibration(const std::filesystem::path& file) {
                       "\"left\" in the name so that the right one can be found beside it",
                       file.string()));
     Calibration other = calibration_of(*right);
-    calibration.of(Eye::left) = calibration.of(Eye::unknown);
-    calibration.of(Eye::right) = other.of(Eye::unknown);
-    calibration.of(Eye::unknown) = {};
+    calibration.of(CameraSide::left) = calibration.of(CameraSide::unknown);
+    calibration.of(CameraSide::right) = other.of(CameraSide::unknown);
+    calibration.of(CameraSide::unknown) = {};
     const cv::Size size = image_size_of(calibration);
-    other.of(Eye::left) = other.of(Eye::unknown);
+    other.of(CameraSide::left) = other.of(CameraSide::unknown);
     if (image_size_of(other) != size)
       throw BadInput(fmt::format("{} is for {}x{} px but {} for {}x{} px, expected the same size", file.string(),
                                  size.width, size.height, right->string(), image_size_of(other).width,
@@ -188,8 +189,8 @@ Calibration whole_calibration(const std::filesystem::path& file) {
              "R and T are missing, and no extrinsics file stands beside it (the same name with extrinsics for "
              "intrinsics); expected all of a stereo calibration, M1 D1 M2 D2 R T");
     add_what_is_missing(calibration, calibration_of(*extrinsics));
-  } else if (!has_camera(calibration.of(Eye::left)) || !has_camera(calibration.of(Eye::right)) ||
-             !calibration.of(Eye::left).find(Role::camera_matrix)) {
+  } else if (!has_camera(calibration.of(CameraSide::left)) || !has_camera(calibration.of(CameraSide::right)) ||
+             !calibration.of(CameraSide::left).find(Role::camera_matrix)) {
     if (const auto intrinsics =
             first_there(file, {{"extrinsics", "intrinsics"}, {"extrinsic", "intrinsic"}, {"ext", "int"}}))
       if (has_pose(calibration)) {

@@ -31,11 +31,11 @@ struct Said {
 struct Calibration {
   std::filesystem::path file;
   std::vector<CalibrationEntry> entries;
-  std::array<Said, 3> said;  // by Eye
+  std::array<Said, 3> said;  // by Camera
   bool by_matlab = false;
 
-  Said& of(CalibrationEye eye) { return said[static_cast<size_t>(eye)]; }
-  const Said& of(CalibrationEye eye) const { return said[static_cast<size_t>(eye)]; }
+  Said& of(CameraSide camera) { return said[static_cast<size_t>(camera)]; }
+  const Said& of(CameraSide camera) const { return said[static_cast<size_t>(camera)]; }
 };
 
 /// Throws BadInput with the reason and the keys that are there.

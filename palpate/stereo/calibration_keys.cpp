@@ -17,9 +17,7 @@ namespace palpate {
 namespace {
 
 using Role = CalibrationRole;
-using Eye = CalibrationEye;
-
-constexpr size_t kMostKeysShown = 16;
+constexpr size_t kMaxKeysShown = 16;
 
 bool is_upper(char c) {
   return std::isupper(static_cast<unsigned char>(c)) != 0;
@@ -59,19 +57,19 @@ std::string joined(const std::vector<std::string>& words) {
 
 /// Side as words say it; numbers are settled when the whole file is known.
 struct Side {
-  Eye eye = Eye::unknown;
+  CameraSide camera = CameraSide::unknown;
   int number = -1;
 };
 
-/// Takes the words that name an eye out of `words`, unless nothing else would be left.
+/// Takes the words that name an camera out of `words`, unless nothing else would be left.
 Side take_side(std::vector<std::string>& words, bool may_be_empty) {
   Side side;
   std::vector<std::string> rest;
   for (const std::string& word : words) {
     if (word == "left" || word == "l" || word == "lft")
-      side.eye = Eye::left;
+      side.camera = CameraSide::left;
     else if (word == "right" || word == "r" || word == "rgt")
-      side.eye = Eye::right;
+      side.camera = CameraSide::right;
     else if (word == "0" || word == "1" || word == "2" || word == "00" || word == "01" || word == "02")
       side.number = word.back() - '0';
     else
@@ -82,7 +80,7 @@ Side take_side(std::vector<std::string>& words, bool may_be_empty) {
   return side;
 }
 
-/// KL, DR, mtxL: a name that ends with the letter of its eye.
+/// KL, DR, mtxL: a name that ends with the letter of its camera.
 Side take_last_letter(std::string& name) {
   static const std::set<std::string> kStems = {"k", "m", "d", "p", "kk", "kc", "mtx", "dist", "cm", "fc", "cc", "rect"};
   if (name.size() < 2) return {};
@@ -90,7 +88,7 @@ Side take_last_letter(std::string& name) {
   const std::string stem = name.substr(0, name.size() - 1);
   if ((last != 'l' && last != 'r') || !kStems.count(stem)) return {};
   name = stem;
-  return {last == 'l' ? Eye::left : Eye::right, -1};
+  return {last == 'l' ? CameraSide::left : CameraSide::right, -1};
 }
 
 std::vector<std::string> segments_of(const std::string& path) {
@@ -154,7 +152,8 @@ Recognised recognise(const CalibrationEntry& entry) {
   Side side, own;
   for (size_t i = 0; i + 1 < segments.size(); ++i) {
     std::vector<std::string> words = words_of(segments[i]);
-    if (const Side found = take_side(words, true); found.eye != Eye::unknown || found.number >= 0) side = found;
+    if (const Side found = take_side(words, true); found.camera != CameraSide::unknown || found.number >= 0)
+      side = found;
   }
   const std::string last = segments.empty() ? "" : segments.back();
   std::vector<std::string> words = words_of(last);
@@ -174,12 +173,12 @@ Recognised recognise(const CalibrationEntry& entry) {
   if (!names_pair) {
     own = take_side(words, false);
     name = joined(words);
-    if (own.eye == Eye::unknown && own.number < 0) own = take_last_letter(name);
+    if (own.camera == CameraSide::unknown && own.number < 0) own = take_last_letter(name);
   }
   if (is_number && coefficient_names().count(name)) {
     result.value.role = Role::coefficient;
     result.value.name = coefficient_names().at(name);
-    result.side = own.eye != Eye::unknown || own.number >= 0 ? own : side;
+    result.side = own.camera != CameraSide::unknown || own.number >= 0 ? own : side;
     return result;
   }
   const auto& roles = roles_by_name();
@@ -202,14 +201,14 @@ Recognised recognise(const CalibrationEntry& entry) {
     if (name == "k" && entry.numbers.size() != 9 && entry.numbers.size() >= 4) role = Role::distortion;
     result.value.role = role == Role::distortion ? role : by_size(role, whole, entry.numbers.size());
     // R1 and P1 of cv::stereoRectify; RotationOfCamera2 is the one rotation there is.
-    const bool numbered = own.number >= 0 || own.eye != Eye::unknown;
+    const bool numbered = own.number >= 0 || own.camera != CameraSide::unknown;
     if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9)
       result.value.role = Role::rectification;
     if (name == "rotationofcamera" || name == "translationofcamera") own = side = {};
     if (result.value.role == Role::transform) own = side = {};
     if (is_first_extrinsic(segments)) side = {};
   }
-  result.side = own.eye != Eye::unknown || own.number >= 0 ? own : side;
+  result.side = own.camera != CameraSide::unknown || own.number >= 0 ? own : side;
   return result;
 }
 
@@ -225,10 +224,12 @@ std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& en
   std::vector<CalibrationValue> values;
   for (const Recognised& one : found) {
     CalibrationValue value = one.value;
-    value.eye = one.side.eye;
-    if (value.eye == Eye::unknown && one.side.number >= 0) {
+    value.camera = one.side.camera;
+    if (value.camera == CameraSide::unknown && one.side.number >= 0) {
       const int first = from_zero ? 0 : 1;
-      value.eye = one.side.number == first ? Eye::left : one.side.number == first + 1 ? Eye::right : Eye::unknown;
+      value.camera = one.side.number == first       ? CameraSide::left
+                     : one.side.number == first + 1 ? CameraSide::right
+                                                    : CameraSide::unknown;
     }
     values.push_back(value);
   }
@@ -262,7 +263,7 @@ std::string keys_there(const std::vector<CalibrationEntry>& entries) {
   std::vector<std::string> shown;
   std::string nearest;
   for (const CalibrationEntry& entry : entries) {
-    if (shown.size() < kMostKeysShown) shown.push_back(entry.path);
+    if (shown.size() < kMaxKeysShown) shown.push_back(entry.path);
     if (!nearest.empty() || recognise(entry).value.role != Role::none) continue;
     if (const std::string expected = nearest_word(entry.path, kExpected); !expected.empty())
       nearest = fmt::format("; '{}' is nearest to '{}'", entry.path, expected);

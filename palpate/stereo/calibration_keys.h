@@ -29,17 +29,17 @@ enum class CalibrationRole {
   distortion_model  ///< a word
 };
 
-enum class CalibrationEye { unknown, left, right };
+enum class CameraSide { unknown, left, right };
 
 struct CalibrationValue {
   CalibrationRole role = CalibrationRole::none;
-  CalibrationEye eye = CalibrationEye::unknown;
+  CameraSide camera = CameraSide::unknown;
   std::string name;  ///< of a coefficient, in small letters
   const CalibrationEntry* entry = nullptr;
 };
 
-/// Told by its keys and its size: M1, K_left, LEFT.K, cameraMatrix1, KL, cam0.intrinsics, CameraParameters1.K ... Eyes
-/// that are numbered count from 0 or from 1, as the file as a whole shows.
+/// Told by its keys and its size: M1, K_left, LEFT.K, cameraMatrix1, KL, cam0.intrinsics, CameraParameters1.K ...
+/// Cameras that are numbered count from 0 or from 1, as the file as a whole shows.
 std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& entries);
 
 /// "the keys there are a, b, c; 'camra_matrix' is nearest to 'camera_matrix'", for sentences.

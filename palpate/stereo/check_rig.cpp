@@ -10,27 +10,27 @@
 namespace palpate {
 namespace {
 
-constexpr double kLeastBaseline_mm = 1, kMostBaseline_mm = 200;
+constexpr double kMinBaseline_mm = 1, kMaxBaseline_mm = 200;
 /// Of R^T R from the identity: what three decimals leave.
 constexpr double kLargestSkew = 1e-3;
 
-void check_camera(const Camera& camera, const std::string& eye, const std::string& file) {
+void check_camera(const Camera& camera, const std::string& name, const std::string& file) {
   const double fx = camera.K(0, 0), fy = camera.K(1, 1);
   if (!(fx > 50 && fx < 20000 && fy > 50 && fy < 20000))
     throw BadInput(fmt::format("{}: focal length of the {} camera is {:.6g} x {:.6g} px, expected 50 to 20000 px", file,
-                               eye, fx, fy));
+                               name, fx, fy));
   if (fx / fy > 2 || fy / fx > 2)
     throw BadInput(
         fmt::format("{}: focal lengths of the {} camera are {:.6g} and {:.6g} px, expected nearly the same in x and y",
-                    file, eye, fx, fy));
+                    file, name, fx, fy));
   const size_t count = camera.distortion.size();
   if (count != 0 && count != 4 && count != 5 && count != 8 && count != 12 && count != 14)
     throw BadInput(
         fmt::format("{}: the {} camera has {} distortion coefficients, expected 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)",
-                    file, eye, count));
+                    file, name, count));
   for (const double coefficient : camera.distortion)
     if (!std::isfinite(coefficient))
-      throw BadInput(fmt::format("{}: a distortion coefficient of the {} camera is not a number", file, eye));
+      throw BadInput(fmt::format("{}: a distortion coefficient of the {} camera is not a number", file, name));
 }
 
 double skew_of(const Mat3& R) {
@@ -65,18 +65,19 @@ void check_rig(const StereoRig& rig) {
                     file, (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff(), R.determinant(), kLargestSkew,
                     sign_that_is_wrong(R)));
   const double baseline = rig.baseline_mm();
-  if (!(baseline >= kLeastBaseline_mm && baseline <= kMostBaseline_mm))
+  if (!(baseline >= kMinBaseline_mm && baseline <= kMaxBaseline_mm))
     throw BadInput(fmt::format(
         "{}: the baseline (length of T) is {:.6g} mm, expected {:g} to {:g} mm; is recording.translation_unit right?",
-        file, baseline, kLeastBaseline_mm, kMostBaseline_mm));
-  const Vec3 right_eye_in_left_mm = -R.transpose() * rig.right_from_left_mm;
-  if (right_eye_in_left_mm.x() < 0 && -right_eye_in_left_mm.x() > 0.5 * baseline)
-    throw BadInput(fmt::format(
-        "{}: T puts the right eye {:.3g} mm to the left of the left eye, expected T[0] < 0 (x_right = R x_left + T); "
-        "the two cameras of the calibration are exchanged or T has the opposite sign",
-        file, -right_eye_in_left_mm.x()));
-  if (right_eye_in_left_mm.x() < 0.5 * baseline)
-    throw BadInput(fmt::format("{}: T is [{:.4g}, {:.4g}, {:.4g}] mm, expected eyes side by side (T mainly along x)",
+        file, baseline, kMinBaseline_mm, kMaxBaseline_mm));
+  const Vec3 right_camera_in_left_mm = -R.transpose() * rig.right_from_left_mm;
+  if (right_camera_in_left_mm.x() < 0 && -right_camera_in_left_mm.x() > 0.5 * baseline)
+    throw BadInput(
+        fmt::format("{}: T puts the right camera {:.3g} mm to the left of the left camera, expected T[0] < 0 (x_right "
+                    "= R x_left + T); "
+                    "the two cameras of the calibration are exchanged or T has the opposite sign",
+                    file, -right_camera_in_left_mm.x()));
+  if (right_camera_in_left_mm.x() < 0.5 * baseline)
+    throw BadInput(fmt::format("{}: T is [{:.4g}, {:.4g}, {:.4g}] mm, expected cameras side by side (T mainly along x)",
                                file, rig.right_from_left_mm.x(), rig.right_from_left_mm.y(),
                                rig.right_from_left_mm.z()));
 }

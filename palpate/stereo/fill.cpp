@@ -9,8 +9,8 @@
 namespace palpate {
 namespace {
 
-constexpr float kNoise = 25 * 2 * 3 * 3;  // of a comparison with three grey levels of noise in each eye
-constexpr float kMostDifference = 0.6f;   // of two windows, of what the left one shows
+constexpr float kNoise = 25 * 2 * 3 * 3;  // of a comparison with three grey levels of noise in each camera
+constexpr float kMaxDifference = 0.6f;    // of two windows, of what the left one shows
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 // Two small windows compared.
@@ -21,22 +21,24 @@ struct Comparison {
 };
 
 // 5 x 5, two rows at a time.
-Comparison compare(const Eyes& eyes, cv::Point at, float disparity) {
+Comparison compare(const PreparedPair& prepared, cv::Point at, float disparity) {
   constexpr int r = 2, pixels = (2 * r + 1) * (2 * r + 1);
   constexpr FloatLanes kBoth = {1, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0};
   constexpr FloatLanes kFirst = {1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   const float x = static_cast<float>(at.x) - disparity;
   const int whole = cvFloor(x);
-  if (whole < r || whole + 7 >= eyes.right.cols || at.x < r || at.x + 6 >= eyes.left.cols || at.y < r ||
-      at.y + r >= eyes.left.rows)
+  if (whole < r || whole + 7 >= prepared.right.cols || at.x < r || at.x + 6 >= prepared.left.cols || at.y < r ||
+      at.y + r >= prepared.left.rows)
     return {};
-  const float t = x - static_cast<float>(whole), middle = eyes.left.at<float>(at);
+  const float t = x - static_cast<float>(whole), middle = prepared.left.at<float>(at);
   FloatLanes sum = {}, squares = {}, left_sum = {}, left_squares = {};
   for (int v = -r; v <= r; v += 2) {
     const int next = std::min(v + 1, r);
     const FloatLanes& weight = v < r ? kBoth : kFirst;
-    const float *a = eyes.left.ptr<float>(at.y + v) + at.x - r, *b = eyes.left.ptr<float>(at.y + next) + at.x - r;
-    const float *c = eyes.right.ptr<float>(at.y + v) + whole - r, *d = eyes.right.ptr<float>(at.y + next) + whole - r;
+    const float *a = prepared.left.ptr<float>(at.y + v) + at.x - r,
+                *b = prepared.left.ptr<float>(at.y + next) + at.x - r;
+    const float *c = prepared.right.ptr<float>(at.y + v) + whole - r,
+                *d = prepared.right.ptr<float>(at.y + next) + whole - r;
     const FloatLanes left = (load_halves(a, b) - middle) * weight;
     const FloatLanes right = (1 - t) * load_halves(c, d) + t * load_halves(c + 1, d + 1) - middle;
     const FloatLanes difference = left - right * weight;
@@ -103,7 +105,7 @@ struct Surroundings {
 
 Surroundings surroundings(const CellGrid& grid, int column, int row) {
   constexpr float kDiffer_px = 0.5f;
-  float least = std::numeric_limits<float>::max(), most = -least;
+  float min = std::numeric_limits<float>::max(), max = -min;
   Surroundings result;
   for (int j = -1; j <= 2; ++j)
     for (int i = -1; i <= 2; ++i) {
@@ -115,23 +117,23 @@ Surroundings surroundings(const CellGrid& grid, int column, int row) {
       }
       const float u = static_cast<float>(-kStep * i), v = static_cast<float>(-kStep * j);
       const float middle = cell.plane.at(u + 0.5f * kStep, v + 0.5f * kStep);
-      least = std::min(least, middle);
-      most = std::max(most, middle);
+      min = std::min(min, middle);
+      max = std::max(max, middle);
       const auto like = [middle](const Surroundings::Surface& s) { return std::abs(s.middle - middle) < kDiffer_px; };
       if (std::none_of(result.surfaces, result.surfaces + result.count, like))
         result.surfaces[result.count++] = {&cell, u, v, middle};
     }
-  result.contested = most - least > 1;
+  result.contested = max - min > 1;
   return result;
 }
 
 // Large windows carry the disparity of one surface a few pixels over the edge of the next. Near a step of depth, the
 // surfaces around compete for the pixel (i, j) of the square, that stands at `at`, in a small window.
-PixelGuess compete(const Eyes& eyes, const Surroundings& around, cv::Point in_square, cv::Point at,
+PixelGuess compete(const PreparedPair& prepared, const Surroundings& around, cv::Point in_square, cv::Point at,
                    const PixelGuess& before) {
   constexpr float kClearlyBetter = 0.7f;
   PixelGuess best = before;
-  float least = 0;
+  float min = 0;
   bool compared = false;
   for (int k = 0; k < around.count; ++k) {
     const Surroundings::Surface& surface = around.surfaces[k];
@@ -141,23 +143,23 @@ PixelGuess compete(const Eyes& eyes, const Surroundings& around, cv::Point in_sq
     if (std::abs(value - before.disparity) < 1) continue;
     if (!compared) {
       compared = true;
-      const Comparison comparison = compare(eyes, at, before.disparity);
+      const Comparison comparison = compare(prepared, at, before.disparity);
       if (!comparison.possible) return before;
-      least = kClearlyBetter * comparison.difference - kNoise / 6;
+      min = kClearlyBetter * comparison.difference - kNoise / 6;
     }
-    const Comparison comparison = compare(eyes, at, value);
-    if (!comparison.possible || comparison.difference >= least) continue;
-    least = comparison.difference;
+    const Comparison comparison = compare(prepared, at, value);
+    if (!comparison.possible || comparison.difference >= min) continue;
+    min = comparison.difference;
     best = {value, cell.information, cell.correlation};
   }
   return best;
 }
 
-// At an edge, what is hidden from the other eye would take the disparity of its neighbours: there the windows differ
+// At an edge, what is hidden from the other camera would take the disparity of its neighbours: there the windows differ
 // by more than the left one shows.
-bool confirmed(const Eyes& eyes, cv::Point at, float disparity) {
-  const Comparison comparison = compare(eyes, at, disparity);
-  return !comparison.possible || comparison.difference < kMostDifference * comparison.texture + kNoise;
+bool confirmed(const PreparedPair& prepared, cv::Point at, float disparity) {
+  const Comparison comparison = compare(prepared, at, disparity);
+  return !comparison.possible || comparison.difference < kMaxDifference * comparison.texture + kNoise;
 }
 
 }  // namespace
@@ -176,8 +178,8 @@ cv::Mat disparity_between_cells(const CellGrid& grid, cv::Size size) {
   return disparity;
 }
 
-DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
-  const cv::Size size = eyes.left.size();
+DisparityMap fill_between_cells(const PreparedPair& prepared, const CellGrid& grid) {
+  const cv::Size size = prepared.left.size();
   DisparityMap map;
   for (cv::Mat* m : {&map.disparity_px, &map.deviation_px, &map.correlation})
     *m = cv::Mat(size, CV_32F, cv::Scalar(kNothing));
@@ -187,12 +189,12 @@ DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid) {
       const Surroundings around = surroundings(grid, column, row);
       for (int i = 0; i < kLanes; ++i) {
         const int x = column * kStep + i % kStep, y = row * kStep + i / kStep;
-        if (x >= size.width || y >= size.height || !eyes.wanted.at<uchar>(y, x)) continue;
+        if (x >= size.width || y >= size.height || !prepared.wanted.at<uchar>(y, x)) continue;
         PixelGuess guess{square.disparity[i], square.information[i], square.correlation[i]};
         if (std::isnan(guess.disparity)) continue;
-        if (around.contested) guess = compete(eyes, around, {i % kStep, i / kStep}, {x, y}, guess);
-        if ((around.contested || around.ragged) && eyes.left_mask.at<uchar>(y, x) &&
-            !confirmed(eyes, {x, y}, guess.disparity))
+        if (around.contested) guess = compete(prepared, around, {i % kStep, i / kStep}, {x, y}, guess);
+        if ((around.contested || around.ragged) && prepared.left_mask.at<uchar>(y, x) &&
+            !confirmed(prepared, {x, y}, guess.disparity))
           continue;
         map.disparity_px.at<float>(y, x) = guess.disparity;
         map.deviation_px.at<float>(y, x) = deviation_px(guess.information);

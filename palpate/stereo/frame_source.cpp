@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/core/source_kind.h"
 #include "palpate/stereo/times_file.h"
 
@@ -35,8 +36,7 @@ double seconds_per_number(const std::vector<NumberedFile>& files, double fps) {
   if (files.size() < 2 || fps > 0) return counted;
   std::vector<long long> steps;
   for (size_t i = 1; i < files.size(); ++i) steps.push_back(files[i].number - files[i - 1].number);
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  const auto step = static_cast<double>(steps[steps.size() / 2]), first = static_cast<double>(files.front().number);
+  const auto step = static_cast<double>(median_of(steps)), first = static_cast<double>(files.front().number);
   constexpr double kYear2001_s = 1e9, kYear2100_s = 4.1e9, kLongestStep_s = 2, kShortestStep_s = 1e-3;
   for (const double unit : {1e-3, 1e-6, 1e-9})
     if (first * unit > kYear2001_s && first * unit < kYear2100_s && step * unit >= kShortestStep_s &&
@@ -100,10 +100,10 @@ class ImageFiles : public FrameSource {
   /// 10, 12 or 14 bits in 16, told from the first image; floating point ends at 1.
   static double white_of(const cv::Mat& image) {
     if (image.depth() != CV_16U) return 1;
-    double most = 0;
-    cv::minMaxLoc(image.reshape(1), nullptr, &most);
+    double max = 0;
+    cv::minMaxLoc(image.reshape(1), nullptr, &max);
     for (const int bits : {10, 12, 14})
-      if (most < (1 << bits)) return (1 << bits) - 1;
+      if (max < (1 << bits)) return (1 << bits) - 1;
     return 65535;
   }
 

@@ -13,13 +13,13 @@ namespace {
 
 constexpr int kLooks = 4;       // Gauss-Newton steps of a fit
 constexpr int kTogether = 256;  // the best matches that hand on their planes at a time
-constexpr float kLeastCorrelation = 0.6f;
-constexpr float kLeastSeedCorrelation = 0.8f;
+constexpr float kMinCorrelation = 0.6f;
+constexpr float kMinSeedCorrelation = 0.8f;
 constexpr int kScale = 2;            // works on images so many times smaller
 constexpr int kStep = 4;             // between cells, px of those images
-constexpr float kMostStep = 0.75f;   // px of those images from the prediction of a neighbour
+constexpr float kMaxStep = 0.75f;    // px of those images from the prediction of a neighbour
 constexpr float kSteepest = 0.8f;    // disparity gradient limit
-constexpr float kMostReturn = 0.5f;  // px of those images, left-right check
+constexpr float kMaxReturn = 0.5f;   // px of those images, left-right check
 constexpr int kSmallestIsland = 15;  // cells
 
 Level shrunk(const cv::Mat& grey, const cv::Mat& mask) {
@@ -39,10 +39,10 @@ struct Proposal {
 
 class Grower {
  public:
-  Grower(const Eyes& eyes, double least, double most)
-      : least_(static_cast<float>(least / kScale)), most_(static_cast<float>(most / kScale)), wanted_(eyes.wanted) {
-    tbb::parallel_invoke([&] { left_ = shrunk(eyes.left, eyes.left_mask); },
-                         [&] { right_ = shrunk(eyes.right, eyes.right_mask); });
+  Grower(const PreparedPair& prepared, double min, double max)
+      : min_(static_cast<float>(min / kScale)), max_(static_cast<float>(max / kScale)), wanted_(prepared.wanted) {
+    tbb::parallel_invoke([&] { left_ = shrunk(prepared.left, prepared.left_mask); },
+                         [&] { right_ = shrunk(prepared.right, prepared.right_mask); });
     grid_.columns = (left_.size.width + kStep - 1) / kStep;
     grid_.rows = (left_.size.height + kStep - 1) / kStep;
     grid_.cells.resize(static_cast<size_t>(grid_.columns * grid_.rows));
@@ -53,13 +53,13 @@ class Grower {
     for (const Seed& seed : seeds.matches)
       propose(cvRound(seed.left_px.x / (kStep * kScale)), cvRound(seed.left_px.y / (kStep * kScale)),
               {seed.disparity_px / kScale, 0, 0});
-    try_proposals(kLeastSeedCorrelation);
+    try_proposals(kMinSeedCorrelation);
     while (!queue_.empty()) {
       for (int i = 0; i < kTogether && !queue_.empty(); ++i) {
         spread(queue_.top().second);
         queue_.pop();
       }
-      try_proposals(kLeastCorrelation);
+      try_proposals(kMinCorrelation);
     }
     check_from_the_right();
     drop_islands();
@@ -70,7 +70,7 @@ class Grower {
   static bool fit(const Level& from, const Level& to, cv::Point at, const DisparityPlane& predicted, int looks,
                   WindowFit& found) {
     Window window;
-    return window.cut(from, at) && window.fit(to, predicted, kMostStep, kSteepest, looks, found);
+    return window.cut(from, at) && window.fit(to, predicted, kMaxStep, kSteepest, looks, found);
   }
 
   void propose(int column, int row, const DisparityPlane& plane) {
@@ -94,7 +94,7 @@ class Grower {
   }
 
   // Fits side by side, taken over in the order of the proposals, so that the answer does not depend on threads.
-  void try_proposals(float least_correlation) {
+  void try_proposals(float min_correlation) {
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, proposals_.size(), 16), [&](const tbb::blocked_range<size_t>& some) {
           for (size_t i = some.begin(); i != some.end(); ++i) {
@@ -102,8 +102,7 @@ class Grower {
             const cv::Point at(proposal.index % grid_.columns * kStep, proposal.index / grid_.columns * kStep);
             WindowFit& found = proposal.found;
             proposal.accepted = fit(left_, right_, at, proposal.plane, kLooks, found) &&
-                                found.correlation >= least_correlation && found.plane.d >= least_ &&
-                                found.plane.d <= most_;
+                                found.correlation >= min_correlation && found.plane.d >= min_ && found.plane.d <= max_;
           }
         });
     for (const Proposal& proposal : proposals_) {
@@ -136,7 +135,7 @@ class Grower {
     const DisparityPlane expected{-(plane.d + plane.dx * off), -plane.dx * stretch, -plane.dy * stretch};
     WindowFit seen;
     return right_.holds(at) && fit(right_, left_, at, expected, 1, seen) &&
-           std::abs(seen.plane.d - expected.d) < kMostReturn;
+           std::abs(seen.plane.d - expected.d) < kMaxReturn;
   }
 
   // The cells of the full size, each with the plane of the nearest cell found.
@@ -149,15 +148,15 @@ class Grower {
     for (int row = 0; row < large.rows; ++row)
       for (int column = 0; column < large.columns; ++column) {
         const Cell* nearest = nullptr;
-        int least = 2 * ratio * ratio + 1;
+        int min = 2 * ratio * ratio + 1;
         for (int j = 0; j < 2; ++j)
           for (int i = 0; i < 2; ++i) {
             const int c = column / ratio + i, r = row / ratio + j;
             if (!grid_.holds(c, r) || !grid_.at(c, r).matched) continue;
             const int x = column - c * ratio, y = row - r * ratio, distance = x * x + y * y;
-            if (distance > least || (nearest && distance == least && grid_.at(c, r).correlation < nearest->correlation))
+            if (distance > min || (nearest && distance == min && grid_.at(c, r).correlation < nearest->correlation))
               continue;
-            least = distance;
+            min = distance;
             nearest = &grid_.at(c, r);
           }
         if (!nearest) continue;
@@ -199,8 +198,8 @@ class Grower {
 
   Level left_;
   Level right_;
-  float least_;
-  float most_;
+  float min_;
+  float max_;
   cv::Mat wanted_;
   CellGrid grid_;
   std::vector<Proposal> proposals_;
@@ -210,8 +209,8 @@ class Grower {
 
 }  // namespace
 
-CellGrid grow(const Eyes& eyes, const Seeds& seeds, double least_disparity_px, double most_disparity_px) {
-  return Grower(eyes, least_disparity_px, most_disparity_px).run(seeds);
+CellGrid grow(const PreparedPair& prepared, const Seeds& seeds, double min_disparity_px, double max_disparity_px) {
+  return Grower(prepared, min_disparity_px, max_disparity_px).run(seeds);
 }
 
 }  // namespace palpate

@@ -31,6 +31,6 @@ struct CellGrid {
 /// accepted when the correlation is high and the disparity changes no faster than the limit. The best few hundred hand
 /// on together, so that their neighbours are tried in parallel. Works on images half as large with cells twice as far
 /// apart; each match has to be found again from the right image, and the cells of the grid take the nearest plane.
-CellGrid grow(const Eyes& eyes, const Seeds& seeds, double least_disparity_px, double most_disparity_px);
+CellGrid grow(const PreparedPair& prepared, const Seeds& seeds, double min_disparity_px, double max_disparity_px);
 
 }  // namespace palpate

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
 
 /// Stamps that are further from the time at which their pictures come count by another clock.
 constexpr int64_t kSameClock_ns = 1'000'000'000;
-constexpr size_t kMostWaiting = 32, kStepsKept = 15;
+constexpr size_t kMaxWaiting = 32, kStepsKept = 15;
 constexpr int64_t kUsualStep_ns = 40'000'000, kSilence_ns = 300'000'000;
 
 }  // namespace
@@ -17,9 +19,7 @@ constexpr int64_t kUsualStep_ns = 40'000'000, kSilence_ns = 300'000'000;
 int64_t LivePairing::step_ns() const {
   if (steps_ns_.empty()) return kUsualStep_ns;
   std::vector<int64_t> steps(steps_ns_.begin(), steps_ns_.end());
-  const auto half = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), half, steps.end());
-  return *half;
+  return median_of(steps);
 }
 
 int64_t LivePairing::silence_ns() const {
@@ -55,7 +55,7 @@ void LivePairing::add(Camera& camera, const Camera& other, StampedPicture pictur
   if (camera.last_stamp_ns && stamp_ns <= *camera.last_stamp_ns) return;
   camera.last_stamp_ns = stamp_ns;
   camera.waiting.push_back({std::move(picture.image), stamp_ns});
-  if (camera.waiting.size() > kMostWaiting) camera.waiting.pop_front();
+  if (camera.waiting.size() > kMaxWaiting) camera.waiting.pop_front();
 }
 
 std::vector<LivePair> LivePairing::settled(int64_t now_ns) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(20);
 /// Time goes on, also where a source comes back with pictures of the time in which it was silent.
-constexpr int64_t kLeastStep_ns = 1'000'000;
+constexpr int64_t kMinStep_ns = 1'000'000;
 
 }  // namespace
 
@@ -56,7 +56,7 @@ std::optional<LivePair> LiveStereo::next() {
     if (!newest_ && ended_) return std::nullopt;
     LivePair pair =
         newest_ ? *std::exchange(newest_, std::nullopt) : LivePair{{}, {}, silent_since_ns, silent_since_ns};
-    last_stamp_ns_ = pair.stamp_ns = std::max(pair.stamp_ns, last_stamp_ns_ + kLeastStep_ns);
+    last_stamp_ns_ = pair.stamp_ns = std::max(pair.stamp_ns, last_stamp_ns_ + kMinStep_ns);
     return pair;
   }
 }

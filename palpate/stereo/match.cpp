@@ -17,27 +17,27 @@
 namespace palpate {
 namespace {
 
-constexpr int kLeastSeeds = 8;
+constexpr int kMinSeeds = 8;
 constexpr double kWarnedRowOffset_px = 0.5;
 
 // Left and right are swapped when many more corners are found again behind infinity than in front of it.
-void check_seeds(const Eyes& eyes, const Seeds& seeds, double least, double most) {
+void check_seeds(const PreparedPair& prepared, const Seeds& seeds, double min, double max) {
   const int found = static_cast<int>(seeds.matches.size());
   if (2 * found < seeds.corners) {
-    const int mirrored = static_cast<int>(find_seeds(eyes, -most, -least).matches.size());
-    if (mirrored >= kLeastSeeds && mirrored > 2 * found)
+    const int mirrored = static_cast<int>(find_seeds(prepared, -max, -min).matches.size());
+    if (mirrored >= kMinSeeds && mirrored > 2 * found)
       throw BadInput(fmt::format(
           "left and right look swapped: {} points match with negative disparity and {} with positive, expected only "
           "positive; set recording.swap: true",
           mirrored, found));
   }
-  if (found < kLeastSeeds)
+  if (found < kMinSeeds)
     throw BadInput(fmt::format(
         "the image shows too little texture to match: {} points of the left image were found in the right one, "
         "expected "
         "at least {} (is the organ region on the organ, does the calibration belong to this recording, is the depth "
         "between map.nearest_mm and map.farthest_mm?)",
-        found, kLeastSeeds));
+        found, kMinSeeds));
 }
 
 cv::Mat eight_bit(const cv::Mat& grey) {
@@ -46,21 +46,21 @@ cv::Mat eight_bit(const cv::Mat& grey) {
   return result;
 }
 
-cv::Mat disparity_by_sgbm(const Eyes& eyes, double least, double most) {
-  const int first = cvFloor(least);
-  const int count = (cvCeil(most) - first + 16) / 16 * 16;
+cv::Mat disparity_by_sgbm(const PreparedPair& prepared, double min, double max) {
+  const int first = cvFloor(min);
+  const int count = (cvCeil(max) - first + 16) / 16 * 16;
   constexpr int kBlock = 5;
   const auto matcher = cv::StereoSGBM::create(first, count, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock, 1, 31, 5,
                                               100, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
   cv::Mat sixteenths, disparity;
-  matcher->compute(eight_bit(eyes.left), eight_bit(eyes.right), sixteenths);
+  matcher->compute(eight_bit(prepared.left), eight_bit(prepared.right), sixteenths);
   sixteenths.convertTo(disparity, CV_32F, 1.0 / 16);
   disparity.setTo(std::numeric_limits<float>::quiet_NaN(), sixteenths < 16 * first);
   return disparity;
 }
 
-cv::Mat disparity_by_dis(const Eyes& eyes, double least, double most) {
-  const cv::Mat left = eight_bit(eyes.left), right = eight_bit(eyes.right);
+cv::Mat disparity_by_dis(const PreparedPair& prepared, double min, double max) {
+  const cv::Mat left = eight_bit(prepared.left), right = eight_bit(prepared.right);
   const auto flow = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
   cv::Mat forth, back;
   flow->calc(left, right, forth);
@@ -71,7 +71,7 @@ cv::Mat disparity_by_dis(const Eyes& eyes, double least, double most) {
     for (int x = 0; x < left.cols; ++x) {
       const cv::Vec2f there = forth.at<cv::Vec2f>(y, x);
       const cv::Point at(cvRound(static_cast<float>(x) + there[0]), cvRound(static_cast<float>(y) + there[1]));
-      if (-there[0] < least || -there[0] > most || !image.contains(at)) continue;
+      if (-there[0] < min || -there[0] > max || !image.contains(at)) continue;
       if (cv::norm(there + back.at<cv::Vec2f>(at)) < 1) disparity.at<float>(y, x) = -there[0];
     }
   return disparity;
@@ -110,28 +110,28 @@ void describe(Settings& settings, MatchOptions& options) {
 
 DisparityMap match(const RectifiedPair& pair, const Rectification& rectification, const cv::Mat& mask,
                    const MatchOptions& options) {
-  const double least = rectification.disparity_px(options.farthest_mm);
-  const double most = rectification.disparity_px(options.nearest_mm);
-  Eyes eyes = prepare_eyes(pair.left, pair.right, mask);
-  eyes.left_mask &= rectification.valid_left;
-  eyes.wanted &= rectification.valid_left;
-  eyes.right_mask &= rectification.valid_right;
-  const Seeds seeds = find_seeds(eyes, least, most);
-  check_seeds(eyes, seeds, least, most);
-  align_rows(eyes, seeds.row_offset_px);
+  const double min = rectification.disparity_px(options.farthest_mm);
+  const double max = rectification.disparity_px(options.nearest_mm);
+  PreparedPair prepared = prepare_pair(pair.left, pair.right, mask);
+  prepared.left_mask &= rectification.valid_left;
+  prepared.wanted &= rectification.valid_left;
+  prepared.right_mask &= rectification.valid_right;
+  const Seeds seeds = find_seeds(prepared, min, max);
+  check_seeds(prepared, seeds, min, max);
+  align_rows(prepared, seeds.row_offset_px);
   DisparityMap map;
   switch (options.matcher) {
     case Matcher::quasi_dense:
-      map = match_quasi_dense(eyes, seeds, least, most);
+      map = match_quasi_dense(prepared, seeds, min, max);
       break;
     case Matcher::sgbm:
-      map = measure(eyes, disparity_by_sgbm(eyes, least, most));
+      map = measure(prepared, disparity_by_sgbm(prepared, min, max));
       break;
     case Matcher::dis:
-      map = measure(eyes, disparity_by_dis(eyes, least, most));
+      map = measure(prepared, disparity_by_dis(prepared, min, max));
       break;
     case Matcher::network:
-      map = measure(eyes,
+      map = measure(prepared,
                     disparity_by_network(pair.left, rows_aligned(pair.right, seeds.row_offset_px), options.network));
       break;
   }

@@ -12,7 +12,7 @@ constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMeasureRadius = 5;
 constexpr float kNoiseSpread = 2.5f;  // of OpenCV's matchers against the rendered organs
 
-cv::Mat warped_right(const Eyes& eyes, const cv::Mat& disparity, cv::Mat& weight) {
+cv::Mat warped_right(const PreparedPair& prepared, const cv::Mat& disparity, cv::Mat& weight) {
   cv::Mat map_x(disparity.size(), CV_32F), map_y(disparity.size(), CV_32F), right;
   for (int y = 0; y < disparity.rows; ++y)
     for (int x = 0; x < disparity.cols; ++x) {
@@ -20,9 +20,9 @@ cv::Mat warped_right(const Eyes& eyes, const cv::Mat& disparity, cv::Mat& weight
       map_y.at<float>(y, x) = static_cast<float>(y);
     }
   cv::patchNaNs(map_x, -10);
-  cv::remap(eyes.right, right, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  cv::remap(eyes.right_mask, weight, map_x, map_y, cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
-  weight &= eyes.left_mask;
+  cv::remap(prepared.right, right, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(prepared.right_mask, weight, map_x, map_y, cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+  weight &= prepared.left_mask;
   weight &= disparity == disparity;
   return right;
 }
@@ -37,16 +37,16 @@ cv::Mat mean(const cv::Mat& values, const cv::Mat& weight_mean) {
 
 }  // namespace
 
-DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px) {
+DisparityMap measure(const PreparedPair& prepared, const cv::Mat& disparity_px) {
   DisparityMap map;
   cv::Mat usable;
-  const cv::Mat right = warped_right(eyes, disparity_px, usable);
+  const cv::Mat right = warped_right(prepared, disparity_px, usable);
   cv::Mat w, w_mean, slope;
   usable.convertTo(w, CV_32F, 1.0 / 255);
   cv::boxFilter(w, w_mean, CV_32F, {2 * kMeasureRadius + 1, 2 * kMeasureRadius + 1});
   w_mean += 1e-6f;
-  cv::Sobel(eyes.left, slope, CV_32F, 1, 0, cv::FILTER_SCHARR, 1.0 / 32);
-  const cv::Mat l = eyes.left.mul(w), r = right.mul(w), g = slope.mul(w);
+  cv::Sobel(prepared.left, slope, CV_32F, 1, 0, cv::FILTER_SCHARR, 1.0 / 32);
+  const cv::Mat l = prepared.left.mul(w), r = right.mul(w), g = slope.mul(w);
   const cv::Mat ml = mean(l, w_mean), mr = mean(r, w_mean), mg = mean(g, w_mean);
   const cv::Mat ll = mean(l.mul(l), w_mean) - ml.mul(ml), rr = mean(r.mul(r), w_mean) - mr.mul(mr);
   const cv::Mat lr = mean(l.mul(r), w_mean) - ml.mul(mr), gg = mean(g.mul(g), w_mean) - mg.mul(mg);

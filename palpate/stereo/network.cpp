@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-constexpr float kMostReturn_px = 1;  // left-right check
+constexpr float kMaxReturn_px = 1;  // left-right check
 
 [[noreturn]] void refuse(const std::filesystem::path& onnx, const std::string& why) {
   throw BadInput(fmt::format(
@@ -58,14 +58,14 @@ cv::Mat disparity_by_network(const cv::Mat& left_bgr, const cv::Mat& right_bgr, 
   const QuietOpenCv quiet;
   cv::dnn::Net network = read_network(onnx);
   cv::Mat from_left = run(network, left_bgr, right_bgr, onnx);
-  // In a mirror the right eye is the left one.
+  // In a mirror the right camera is the left one.
   const cv::Mat from_right = mirrored(run(network, mirrored(right_bgr), mirrored(left_bgr), onnx));
   for (int y = 0; y < from_left.rows; ++y)
     for (int x = 0; x < from_left.cols; ++x) {
       float& d = from_left.at<float>(y, x);
       const int there = cvRound(static_cast<float>(x) - d);
       const bool seen = there >= 0 && there < from_left.cols;
-      if (!seen || std::abs(from_right.at<float>(y, there) - d) > kMostReturn_px)
+      if (!seen || std::abs(from_right.at<float>(y, there) - d) > kMaxReturn_px)
         d = std::numeric_limits<float>::quiet_NaN();
     }
   return from_left;

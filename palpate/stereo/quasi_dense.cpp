@@ -21,24 +21,24 @@ Level softened(const cv::Mat& grey, const cv::Mat& mask) {
 }  // namespace
 
 DisparityMap match_quasi_dense(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask,
-                               double least_disparity_px, double most_disparity_px) {
-  Eyes eyes = prepare_eyes(left_bgr, right_bgr, mask);
-  const Seeds seeds = find_seeds(eyes, least_disparity_px, most_disparity_px);
-  align_rows(eyes, seeds.row_offset_px);
-  return match_quasi_dense(eyes, seeds, least_disparity_px, most_disparity_px);
+                               double min_disparity_px, double max_disparity_px) {
+  PreparedPair prepared = prepare_pair(left_bgr, right_bgr, mask);
+  const Seeds seeds = find_seeds(prepared, min_disparity_px, max_disparity_px);
+  align_rows(prepared, seeds.row_offset_px);
+  return match_quasi_dense(prepared, seeds, min_disparity_px, max_disparity_px);
 }
 
-DisparityMap match_quasi_dense(const Eyes& eyes, const Seeds& seeds, double least_disparity_px,
-                               double most_disparity_px) {
-  CellGrid grid = grow(eyes, seeds, least_disparity_px, most_disparity_px);
+DisparityMap match_quasi_dense(const PreparedPair& prepared, const Seeds& seeds, double min_disparity_px,
+                               double max_disparity_px) {
+  CellGrid grid = grow(prepared, seeds, min_disparity_px, max_disparity_px);
   Level left, right;
-  tbb::parallel_invoke([&] { left = softened(eyes.left, eyes.left_mask); },
-                       [&] { right = softened(eyes.right, eyes.right_mask); });
+  tbb::parallel_invoke([&] { left = softened(prepared.left, prepared.left_mask); },
+                       [&] { right = softened(prepared.right, prepared.right_mask); });
   for (const Reach reach : {Reach{5, 1}, Reach{12, 2}}) {
     refine_cells(left, right, grid);
     smooth_cells(grid, reach);
   }
-  DisparityMap map = fill_between_cells(eyes, grid);
+  DisparityMap map = fill_between_cells(prepared, grid);
   map.row_offset_px = seeds.row_offset_px;
   return map;
 }

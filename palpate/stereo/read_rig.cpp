@@ -18,26 +18,25 @@ namespace palpate {
 namespace {
 
 using Role = CalibrationRole;
-using Eye = CalibrationEye;
 using Numbers = std::vector<double>;
 
-constexpr double kMostBaseline_mm = 200;
+constexpr double kMaxBaseline_mm = 200;
 
 /// The camera matrix, wherever its numbers stand.
-std::optional<cv::Matx33d> camera_matrix_of(const Said& eye, const Said& both) {
-  if (const Numbers* K = eye.find(Role::camera_matrix)) return cv::Matx33d(K->data());
+std::optional<cv::Matx33d> camera_matrix_of(const Said& camera, const Said& both) {
+  if (const Numbers* K = camera.find(Role::camera_matrix)) return cv::Matx33d(K->data());
   const auto from = [](double fx, double fy, double cx, double cy) {
     return cv::Matx33d(fx, 0, cx, 0, fy, cy, 0, 0, 1);
   };
-  if (const Numbers* n = eye.find(Role::intrinsics)) return from((*n)[0], (*n)[1], (*n)[2], (*n)[3]);
-  if (const Numbers* f = eye.find(Role::focal), *c = eye.find(Role::principal); f && c)
+  if (const Numbers* n = camera.find(Role::intrinsics)) return from((*n)[0], (*n)[1], (*n)[2], (*n)[3]);
+  if (const Numbers* f = camera.find(Role::focal), *c = camera.find(Role::principal); f && c)
     return from((*f)[0], (*f)[1], (*c)[0], (*c)[1]);
-  for (const Said* said : {&eye, &both}) {
+  for (const Said* said : {&camera, &both}) {
     const double f = said->coefficient("f"), fx = said->coefficient("fx", f);
     if (fx > 0 && said->coefficients.count("cx") && said->coefficients.count("cy"))
       return from(fx, said->coefficient("fy", fx), said->coefficient("cx"), said->coefficient("cy"));
   }
-  if (const Numbers* P = eye.find(Role::projection))
+  if (const Numbers* P = camera.find(Role::projection))
     return cv::Matx33d((*P)[0], (*P)[1], (*P)[2], (*P)[4], (*P)[5], (*P)[6], (*P)[8], (*P)[9], (*P)[10]);
   return std::nullopt;
 }
@@ -66,21 +65,21 @@ bool is_transposed(const cv::Matx33d& K) {
 /// numbers are k1 k2 p1 p2.
 constexpr double kLargestTangential = 0.02, kUsualTangential = 0.01;
 
-LensModel lens_of(const Calibration& calibration, const Said& said, const Numbers& D, const char* eye) {
-  const std::string model = said.model + calibration.of(Eye::unknown).model;
+LensModel lens_of(const Calibration& calibration, const Said& said, const Numbers& D, const char* camera) {
+  const std::string model = said.model + calibration.of(CameraSide::unknown).model;
   const auto says = [&model](std::initializer_list<const char*> words) {
     return std::any_of(words.begin(), words.end(), [&](const char* w) { return model.find(w) != std::string::npos; });
   };
   if (says({"omni", "eucm", "double_sphere", "ds-none", "fov"}))
     refuse(calibration, fmt::format("the lens model of the {} camera is{}, expected plumb_bob (k1 k2 p1 p2 k3), "
                                     "rational_polynomial or a fisheye model (equidistant, Kannala-Brandt)",
-                                    eye, model));
+                                    camera, model));
   if (says({"fisheye", "equidistant", "kannala", "kb4", "equi"})) {
     if (D.size() != 4)
       refuse(calibration,
              fmt::format("the lens model of the {} camera is{}, expected 4 coefficients (k1 k2 k3 k4) where "
                          "there are {}, or distortion_model plumb_bob",
-                         eye, model, D.size()));
+                         camera, model, D.size()));
     return LensModel::fisheye;
   }
   if (D.size() != 4 || says({"plumb", "radtan", "rational", "brown", "radial", "opencv"})) return LensModel::brown;
@@ -92,18 +91,18 @@ LensModel lens_of(const Calibration& calibration, const Said& said, const Number
              "the four distortion coefficients of the {} camera can be k1 k2 p1 p2 or, with {:g} and {:g} in third "
              "and fourth place, k1 k2 k3 k4 of a fisheye lens; say which by distortion_model: plumb_bob or "
              "distortion_model: fisheye in the file",
-             eye, D[2], D[3]));
+             camera, D[2], D[3]));
 }
 
-Camera camera_of(const Calibration& calibration, Eye side, StereoRig& rig) {
-  const char* eye = side == Eye::left ? "left" : "right";
-  const int number = side == Eye::left ? 1 : 2;
+Camera camera_of(const Calibration& calibration, CameraSide side, StereoRig& rig) {
+  const char* name = side == CameraSide::left ? "left" : "right";
+  const int number = side == CameraSide::left ? 1 : 2;
   const Said& said = calibration.of(side);
-  const auto K = camera_matrix_of(said, calibration.of(Eye::unknown));
+  const auto K = camera_matrix_of(said, calibration.of(CameraSide::unknown));
   if (!K)
     refuse(calibration, fmt::format("no camera matrix of the {} camera, expected M{} (or K{}, cameraMatrix{}, "
                                     "camera_matrix_{}, {}.K, cam{}.intrinsics ...)",
-                                    eye, number, number, number, eye, eye, number - 1));
+                                    name, number, number, number, name, name, number - 1));
   Camera camera;
   camera.K = *K;
   const bool transposed = is_transposed(camera.K);
@@ -112,17 +111,17 @@ Camera camera_of(const Calibration& calibration, Eye side, StereoRig& rig) {
     camera.K(0, 2) -= 1;
     camera.K(1, 2) -= 1;
     rig.notes.push_back(fmt::format("{} camera matrix as MATLAB writes it: {}pixels counted from 1, turned into ours",
-                                    eye, transposed ? "transposed, " : ""));
+                                    name, transposed ? "transposed, " : ""));
   }
   if (const auto D = distortion_of(said)) {
     camera.distortion = *D;
-    camera.lens = lens_of(calibration, said, *D, eye);
+    camera.lens = lens_of(calibration, said, *D, name);
     if (camera.lens == LensModel::fisheye)
-      rig.notes.push_back(fmt::format("{} camera: fisheye lens (Kannala-Brandt, k1 k2 k3 k4)", eye));
-  } else if (!said.find(Role::projection) && !calibration.of(Eye::unknown).coefficients.count("baseline")) {
+      rig.notes.push_back(fmt::format("{} camera: fisheye lens (Kannala-Brandt, k1 k2 k3 k4)", name));
+  } else if (!said.find(Role::projection) && !calibration.of(CameraSide::unknown).coefficients.count("baseline")) {
     refuse(calibration, fmt::format("no distortion of the {} camera, expected D{} (or distCoeffs{}, "
                                     "distortion_coefficients_{}, cam{}.distortion_coeffs ...)",
-                                    eye, number, number, eye, number - 1));
+                                    name, number, number, name, number - 1));
   }
   return camera;
 }
@@ -189,8 +188,8 @@ std::optional<Pose> world_pose(const Said& said) {
 }
 
 Pose pose_of(const Calibration& calibration) {
-  const Said &both = calibration.of(Eye::unknown), &left = calibration.of(Eye::left),
-             &right = calibration.of(Eye::right);
+  const Said &both = calibration.of(CameraSide::unknown), &left = calibration.of(CameraSide::left),
+             &right = calibration.of(CameraSide::right);
   if (const auto pose = world_pose(both)) {
     if (!both.find(Role::transform) && !both.find(Role::rotation)) refuse(calibration, "key R is missing");
     return *pose;
@@ -213,19 +212,19 @@ Pose pose_of(const Calibration& calibration) {
 double to_mm(TranslationUnit unit, double length) {
   if (unit == TranslationUnit::mm) return 1;
   if (unit == TranslationUnit::m) return 1000;
-  return length <= kMostBaseline_mm / 1000 ? 1000 : 1;
+  return length <= kMaxBaseline_mm / 1000 ? 1000 : 1;
 }
 
 StereoRig rig_of(const Calibration& calibration, TranslationUnit unit) {
   StereoRig rig;
   rig.file = calibration.file;
   rig.image_size = image_size_of(calibration);
-  rig.left = camera_of(calibration, Eye::left, rig);
-  rig.right = camera_of(calibration, Eye::right, rig);
+  rig.left = camera_of(calibration, CameraSide::left, rig);
+  rig.right = camera_of(calibration, CameraSide::right, rig);
   Pose pose = pose_of(calibration);
-  const bool transposed = calibration.by_matlab && calibration.of(Eye::unknown).find(Role::rotation) &&
-                          calibration.of(Eye::unknown).find(Role::rotation)->size() == 9;
-  const Numbers* K = calibration.of(Eye::left).find(Role::camera_matrix);
+  const bool transposed = calibration.by_matlab && calibration.of(CameraSide::unknown).find(Role::rotation) &&
+                          calibration.of(CameraSide::unknown).find(Role::rotation)->size() == 9;
+  const Numbers* K = calibration.of(CameraSide::left).find(Role::camera_matrix);
   if (transposed || (K && is_transposed(cv::Matx33d(K->data())))) pose.rotation.transposeInPlace();
   rig.right_from_left = pose.rotation;
   rig.right_from_left_mm = pose.translation * to_mm(unit, pose.translation.norm());

@@ -29,13 +29,13 @@ void check_options(const RecordingOptions& options) {
   std::error_code ignored;
   if (two && (options.left == options.right || std::filesystem::equivalent(options.left, options.right, ignored)))
     throw BadInput(fmt::format(
-        "recording.left and recording.right are the same, {}, expected one for each eye (or stereo with its layout)",
+        "recording.left and recording.right are the same, {}, expected one for each camera (or stereo with its layout)",
         options.left.string()));
   if (!options.crop_px.empty() || options.crop_px == cv::Rect2d()) return;
   throw BadInput("recording.crop has no area, expected [x, y, width, height] in pixels of the calibrated images");
 }
 
-cv::Size eye_size_of(const RecordingOptions& options, cv::Size both) {
+cv::Size camera_size_of(const RecordingOptions& options, cv::Size both) {
   const bool beside = options.layout == StereoLayout::side_by_side;
   const int length = beside ? both.width : both.height;
   if (length % 2 != 0)
@@ -85,9 +85,9 @@ StereoRig read_rig(const RecordingOptions& options) {
 
 struct Recording::Sources {
   RecordingOptions options;
-  std::unique_ptr<FrameSource> first;   // left, or both eyes in one image
+  std::unique_ptr<FrameSource> first;   // left, or both cameras in one image
   std::unique_ptr<FrameSource> second;  // right, or none
-  cv::Size eye_size;
+  cv::Size camera_size;
   double fps = 0;
   int frame_count = -1;
   int index = 0;
@@ -103,10 +103,10 @@ struct Recording::Sources {
 
   StereoFrame split(const cv::Mat& both) const {
     StereoFrame frame;
-    const cv::Point second_eye =
-        options.layout == StereoLayout::side_by_side ? cv::Point(eye_size.width, 0) : cv::Point(0, eye_size.height);
-    frame.left = both(cv::Rect({0, 0}, eye_size)).clone();
-    frame.right = both(cv::Rect(second_eye, eye_size)).clone();
+    const cv::Point second_camera = options.layout == StereoLayout::side_by_side ? cv::Point(camera_size.width, 0)
+                                                                                 : cv::Point(0, camera_size.height);
+    frame.left = both(cv::Rect({0, 0}, camera_size)).clone();
+    frame.right = both(cv::Rect(second_camera, camera_size)).clone();
     return frame;
   }
 
@@ -233,7 +233,7 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   s.options = options;
   if (const std::vector<LiveCameras::Camera> cameras = live_cameras(options); !cameras.empty()) {
     s.live = std::make_unique<LiveStereo>(cameras);
-    s.eye_size = options.stereo.empty() ? s.live->size() : eye_size_of(options, s.live->size());
+    s.camera_size = options.stereo.empty() ? s.live->size() : camera_size_of(options, s.live->size());
     s.fps = options.fps > 0 ? options.fps : s.live->stated_fps();
     if (!(s.fps > 0)) s.fps = kFallbackFps;
     s.pairing.timing.is_live = true;
@@ -244,10 +244,10 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
     s.first = open_frame_source(options.left, "recording.left", options.fps);
     s.second = open_frame_source(options.right, "recording.right", options.fps);
     check_alike(options, *s.first, *s.second);
-    s.eye_size = s.first->size();
+    s.camera_size = s.first->size();
   } else {
     s.first = open_frame_source(options.stereo, "recording.stereo", options.fps);
-    s.eye_size = eye_size_of(options, s.first->size());
+    s.camera_size = camera_size_of(options, s.first->size());
   }
   const std::vector<double>& stamps = s.first->stamps_s();
   if (!stamps.empty()) s.first_stamp_s = stamps.front();
@@ -308,7 +308,7 @@ std::optional<StereoFrame> Recording::next() {
 }
 
 cv::Size Recording::size() const {
-  return sources_->eye_size;
+  return sources_->camera_size;
 }
 double Recording::fps() const {
   return sources_->fps;

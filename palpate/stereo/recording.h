@@ -65,7 +65,7 @@ class Recording {
   /// The next frame, or nothing at the end. Throws Unfinished when a file is cut: its header states more than it holds.
   std::optional<StereoFrame> next();
 
-  cv::Size size() const;    ///< of one eye, px
+  cv::Size size() const;    ///< of one camera, px
   double fps() const;       ///< frames per second, mean over the recording
   int frame_count() const;  ///< of the left camera; -1 when unknown (live sources)
   const RecordingTiming& timing() const;

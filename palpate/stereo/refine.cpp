@@ -8,11 +8,11 @@
 namespace palpate {
 namespace {
 
-constexpr float kMostStep_px = 1.0f;
+constexpr float kMaxStep_px = 1.0f;
 constexpr float kSteepest = 0.9f;
-constexpr float kLeastCorrelation = 0.6f;
-constexpr float kLeastShare = 0.2f;      // of the window's weight
-constexpr float kLeastGradient = 0.02f;  // mean square of the gradient, grey levels per px
+constexpr float kMinCorrelation = 0.6f;
+constexpr float kMinFraction = 0.2f;   // of the window's weight
+constexpr float kMinGradient = 0.02f;  // mean square of the gradient, grey levels per px
 constexpr int kRadius = 7;
 constexpr int kRows = 2 * kRadius + 1;
 constexpr FloatLanes kColumn = {-7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 7, 8};
@@ -33,7 +33,7 @@ Superposed superpose(const Level& left, const Level& right, const cv::Mat& dispa
   result.left = left.grey;
   for (cv::Mat* plane : {&result.right, &result.slope, &result.weight})
     *plane = cv::Mat(left.grey.size(), CV_32F, cv::Scalar(0));
-  const float most = static_cast<float>(left.size.width - 1);
+  const float max = static_cast<float>(left.size.width - 1);
   tbb::parallel_for(0, left.size.height, [&](int y) {
     const float* d = disparity.ptr<float>(y);
     const float *grey = right.grey_at(0, y), *mask = right.weight_at(0, y);
@@ -43,7 +43,7 @@ Superposed superpose(const Level& left, const Level& right, const cv::Mat& dispa
     float* weight = result.weight.ptr<float>(y + m) + m;
     for (int x = 0; x < left.size.width; ++x) {
       const float at = static_cast<float>(x) - d[x];
-      const bool inside = at >= 0 && at <= most;  // false for NaN
+      const bool inside = at >= 0 && at <= max;  // false for NaN
       const float there = inside ? at : 0;
       const int whole = static_cast<int>(there);
       const float t = there - static_cast<float>(whole);
@@ -98,13 +98,13 @@ constexpr float full_weight() {
 
 void refine_cell(const Superposed& images, cv::Point at, Cell& cell) {
   const WindowSums sums = sums_around(images, at.x, at.y);
-  cell.matched = sums.n > kLeastShare * full_weight() && sums.gg > kLeastGradient * sums.n;
+  cell.matched = sums.n > kMinFraction * full_weight() && sums.gg > kMinGradient * sums.n;
   Eigen::Vector3f step;
   if (!cell.matched || !(cell.matched = sums.solve(step, cell.correlation, cell.information))) return;
   cell.plane.d += step[0];
   cell.plane.dx += step[1];
   cell.plane.dy += step[2];
-  cell.matched = cell.correlation > kLeastCorrelation && std::abs(step[0]) <= kMostStep_px &&
+  cell.matched = cell.correlation > kMinCorrelation && std::abs(step[0]) <= kMaxStep_px &&
                  std::abs(cell.plane.dx) <= kSteepest && std::abs(cell.plane.dy) <= kSteepest;
 }
 

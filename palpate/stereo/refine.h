@@ -31,9 +31,9 @@ void smooth_cells(CellGrid& grid, Reach reach);
 
 /// Disparity, deviation and correlation of every pixel of the left mask from the planes of the cells around it; at a
 /// step of depth the surface whose small window fits better takes the pixel.
-DisparityMap fill_between_cells(const Eyes& eyes, const CellGrid& grid);
+DisparityMap fill_between_cells(const PreparedPair& prepared, const CellGrid& grid);
 
 /// Correlation and deviation of a disparity found by other means.
-DisparityMap measure(const Eyes& eyes, const cv::Mat& disparity_px);
+DisparityMap measure(const PreparedPair& prepared, const cv::Mat& disparity_px);
 
 }  // namespace palpate

@@ -27,19 +27,19 @@ void check_rig_fits(const StereoRig& rig, cv::Size video_size) {
     throw BadInput(fmt::format("{}: the calibration is for images of {}x{} px but the video has {}x{} px{}", file,
                                rig.image_size.width, rig.image_size.height, video_size.width, video_size.height,
                                how_they_may_fit(rig.image_size, video_size)));
-  for (const auto& [camera, eye] : {std::pair{&rig.left, "left"}, std::pair{&rig.right, "right"}}) {
+  for (const auto& [camera, name] : {std::pair{&rig.left, "left"}, std::pair{&rig.right, "right"}}) {
     const double cx = camera->K(0, 2), cy = camera->K(1, 2);
     const double middle_x = 0.5 * (video_size.width - 1), middle_y = 0.5 * (video_size.height - 1);
     if (std::abs(cx - middle_x) > 0.2 * video_size.width || std::abs(cy - middle_y) > 0.2 * video_size.height)
       throw BadInput(fmt::format(
           "{}: the principal point of the {} camera is ({:.1f}, {:.1f}), far from the centre ({:.1f}, {:.1f}) of the "
           "{}x{} video; expected a calibration for this image size",
-          file, eye, cx, cy, middle_x, middle_y, video_size.width, video_size.height));
+          file, name, cx, cy, middle_x, middle_y, video_size.width, video_size.height));
     const double focal = camera->K(0, 0);
     if (focal < 0.2 * video_size.width || focal > 15 * video_size.width)
       throw BadInput(fmt::format(
           "{}: the focal length of the {} camera is {:.6g} px, expected {:.0f} to {:.0f} px for a video {} px wide",
-          file, eye, focal, 0.2 * video_size.width, 15.0 * video_size.width, video_size.width));
+          file, name, focal, 0.2 * video_size.width, 15.0 * video_size.width, video_size.width));
   }
 }
 

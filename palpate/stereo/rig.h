@@ -21,7 +21,7 @@ struct Camera {
   LensModel lens = LensModel::brown;
 };
 
-/// A calibrated pair of eyes: x_right = right_from_left * x_left + right_from_left_mm.
+/// A calibrated pair of cameras: x_right = right_from_left * x_left + right_from_left_mm.
 struct StereoRig {
   cv::Size image_size;  ///< empty when the calibration names none
   Camera left;
@@ -67,7 +67,7 @@ std::vector<cv::Point2d> undistorted(const Camera& camera, const std::vector<cv:
 /// distortion). The point must have z > 0.
 cv::Point2d project_to_recorded_left(const StereoRig& rig, const Vec3& point_in_left_mm);
 
-/// Two images whose rows match; both eyes share focal length and principal point, so that z = focal * baseline / d.
+/// Two images whose rows match; both cameras share focal length and principal point, so that z = focal * baseline / d.
 struct RectifiedPair {
   int index = 0;
   double time_s = 0;

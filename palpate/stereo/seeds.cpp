@@ -5,23 +5,25 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 namespace {
 
-constexpr int kMostCorners = 600;
+constexpr int kMaxCorners = 600;
 constexpr int kCoarse = 4;        // the search along the row works on images this many times smaller
 constexpr int kCoarseRadius = 4;  // of its windows
-constexpr float kMostReturn_px = 0.5f;
-constexpr float kMostRowOffset_px = 3.0f;
-constexpr float kMostRowScatter_px = 1.0f;
+constexpr float kMaxReturn_px = 0.5f;
+constexpr float kMaxRowOffset_px = 3.0f;
+constexpr float kMaxRowScatter_px = 1.0f;
 
 std::vector<cv::Point2f> corners_of(const cv::Mat& grey, const cv::Mat& mask) {
   cv::Mat half, half_mask;
   cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
   cv::resize(mask, half_mask, half.size(), 0, 0, cv::INTER_NEAREST);
-  const double spacing = std::max(4.0, std::sqrt(cv::countNonZero(half_mask) / (1.5 * kMostCorners)));
+  const double spacing = std::max(4.0, std::sqrt(cv::countNonZero(half_mask) / (1.5 * kMaxCorners)));
   std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(half, corners, kMostCorners, 0.002, spacing, half_mask, 5);
+  cv::goodFeaturesToTrack(half, corners, kMaxCorners, 0.002, spacing, half_mask, 5);
   for (cv::Point2f& corner : corners) corner = 2 * corner + cv::Point2f(0.5f, 0.5f);
   return corners;
 }
@@ -45,11 +47,11 @@ float correlation(const cv::Mat& left, cv::Point at, const cv::Mat& right, cv::P
 }
 
 // Where each corner is best found along its row, roughly.
-std::vector<cv::Point2f> coarse_search(const Eyes& eyes, const std::vector<cv::Point2f>& corners, double least,
-                                       double most) {
+std::vector<cv::Point2f> coarse_search(const PreparedPair& prepared, const std::vector<cv::Point2f>& corners,
+                                       double min, double max) {
   cv::Mat left, right;
-  cv::resize(eyes.left, left, {}, 1.0 / kCoarse, 1.0 / kCoarse, cv::INTER_AREA);
-  cv::resize(eyes.right, right, left.size(), 0, 0, cv::INTER_AREA);
+  cv::resize(prepared.left, left, {}, 1.0 / kCoarse, 1.0 / kCoarse, cv::INTER_AREA);
+  cv::resize(prepared.right, right, left.size(), 0, 0, cv::INTER_AREA);
   const cv::Rect inside(kCoarseRadius, kCoarseRadius, left.cols - 2 * kCoarseRadius, left.rows - 2 * kCoarseRadius);
   std::vector<cv::Point2f> found = corners;
   for (cv::Point2f& corner : found) {
@@ -57,7 +59,7 @@ std::vector<cv::Point2f> coarse_search(const Eyes& eyes, const std::vector<cv::P
     if (!inside.contains(at)) continue;
     float best = -1;
     int best_shift = 0;
-    for (int shift = cvFloor(least / kCoarse); shift <= cvCeil(most / kCoarse); ++shift) {
+    for (int shift = cvFloor(min / kCoarse); shift <= cvCeil(max / kCoarse); ++shift) {
       const cv::Point there(at.x - shift, at.y);
       if (!inside.contains(there)) continue;
       const float score = correlation(left, at, right, there);
@@ -66,13 +68,6 @@ std::vector<cv::Point2f> coarse_search(const Eyes& eyes, const std::vector<cv::P
     corner.x -= static_cast<float>(kCoarse * best_shift);
   }
   return found;
-}
-
-double median(std::vector<float> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // How far the rows' offset wanders over the image, px: medians over neighbouring seeds scatter more than the noise of
@@ -92,26 +87,27 @@ double wandering(const std::vector<Seed>& seeds, const std::vector<float>& rows,
     std::nth_element(others.begin(), others.begin() + kGroup, others.end());
     std::vector<float> group;
     for (size_t k = 0; k < kGroup; ++k) group.push_back(others[k].second);
-    const float middle = static_cast<float>(median(group));
+    const float middle = static_cast<float>(median_of(group));
     about_all.push_back(std::abs(middle - static_cast<float>(offset)));
     about_group.push_back(std::abs(rows[i] - middle));
   }
-  const double wander = kToDeviation * median(about_all), noise = kToDeviation * kMedianOfGroup * median(about_group);
+  const double wander = kToDeviation * median_of(about_all),
+               noise = kToDeviation * kMedianOfGroup * median_of(about_group);
   return std::sqrt(std::max(0.0, wander * wander - noise * noise));
 }
 
 }  // namespace
 
-Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_disparity_px) {
+Seeds find_seeds(const PreparedPair& prepared, double min_disparity_px, double max_disparity_px) {
   Seeds seeds;
   cv::Mat left, right;
-  eyes.left.convertTo(left, CV_8U);
-  eyes.right.convertTo(right, CV_8U);
-  const std::vector<cv::Point2f> corners = corners_of(left, eyes.left_mask);
+  prepared.left.convertTo(left, CV_8U);
+  prepared.right.convertTo(right, CV_8U);
+  const std::vector<cv::Point2f> corners = corners_of(left, prepared.left_mask);
   seeds.corners = static_cast<int>(corners.size());
   if (corners.empty()) return seeds;
 
-  std::vector<cv::Point2f> there = coarse_search(eyes, corners, least_disparity_px, most_disparity_px);
+  std::vector<cv::Point2f> there = coarse_search(prepared, corners, min_disparity_px, max_disparity_px);
   std::vector<cv::Point2f> back = corners;
   std::vector<uchar> found, found_back;
   std::vector<float> error;
@@ -131,17 +127,17 @@ Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_dispar
   std::vector<float> rows;
   for (size_t i = 0; i < corners.size(); ++i) {
     const float disparity = corners[i].x - there[i].x;
-    if (!found[i] || !found_back[i] || !image.contains(there[i]) || !eyes.right_mask.at<uchar>(there[i])) continue;
-    if (cv::norm(back[i] - corners[i]) > kMostReturn_px) continue;
-    if (disparity < least_disparity_px || disparity > most_disparity_px) continue;
-    if (std::abs(there[i].y - corners[i].y) > kMostRowOffset_px) continue;
+    if (!found[i] || !found_back[i] || !image.contains(there[i]) || !prepared.right_mask.at<uchar>(there[i])) continue;
+    if (cv::norm(back[i] - corners[i]) > kMaxReturn_px) continue;
+    if (disparity < min_disparity_px || disparity > max_disparity_px) continue;
+    if (std::abs(there[i].y - corners[i].y) > kMaxRowOffset_px) continue;
     kept.push_back(i);
     rows.push_back(there[i].y - corners[i].y);
   }
-  seeds.row_offset_px = median(rows);
+  seeds.row_offset_px = median_of(rows);
   std::vector<float> rows_of_matches;
   for (size_t k = 0; k < kept.size(); ++k) {
-    if (std::abs(rows[k] - static_cast<float>(seeds.row_offset_px)) >= kMostRowScatter_px) continue;
+    if (std::abs(rows[k] - static_cast<float>(seeds.row_offset_px)) >= kMaxRowScatter_px) continue;
     seeds.matches.push_back({corners[kept[k]], corners[kept[k]].x - there[kept[k]].x});
     rows_of_matches.push_back(rows[k]);
   }

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "palpate/stereo/eyes.h"
+#include "palpate/stereo/prepared_pair.h"
 
 namespace palpate {
 
@@ -24,6 +24,6 @@ struct Seeds {
 
 /// Corners matched by pyramidal Lucas-Kanade across the pair, checked both ways, whose disparity lies in
 /// [least, most] px and whose rows agree. A coarse search along the row says where Lucas-Kanade starts.
-Seeds find_seeds(const Eyes& eyes, double least_disparity_px, double most_disparity_px);
+Seeds find_seeds(const PreparedPair& prepared, double min_disparity_px, double max_disparity_px);
 
 }  // namespace palpate

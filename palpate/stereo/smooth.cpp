@@ -9,13 +9,13 @@ namespace {
 
 constexpr float kSameSurface_px = 0.2f;
 constexpr float kGateDeviations = 3;
-constexpr float kLeastAgreement = 0.3f;   // of the neighbours, by weight
-constexpr float kLeastNeighbours = 4.0f;  // by weight
-constexpr int kMargin = 16;               // cells, more than any reach
-constexpr int kNear = 5;                  // cells that have to agree
+constexpr float kMinAgreement = 0.3f;   // of the neighbours, by weight
+constexpr float kMinNeighbours = 4.0f;  // by weight
+constexpr int kMargin = 16;             // cells, more than any reach
+constexpr int kNear = 5;                // cells that have to agree
 // A pixel counts in as many windows of refinement as cells stand in one.
 constexpr float kWindowsPerPixel = 11;
-constexpr float kLeastScatter = 0.25f;
+constexpr float kMinScatter = 0.25f;
 
 // The grid as planes of numbers with a margin without information, so that sixteen cells are worked on at once.
 class Planes {
@@ -106,7 +106,7 @@ void solve(const FloatLanes (&L)[kProducts], FloatLanes (&b)[kTerms]) {
 }
 
 FloatLanes corner_of_inverse(const FloatLanes (&L)[kProducts]) {
-  FloatLanes column[kTerms] = {all_lanes(1)}, sum = {};
+  FloatLanes column[kTerms] = {all_of_simd(1)}, sum = {};
   solve_lower(L, column);
   for (const FloatLanes& value : column) sum += value * value;
   return sum;
@@ -136,7 +136,7 @@ Quadratics fit_quadratics(const Planes& planes, const std::vector<Neighbour>& ar
         rise - 0.5f * ((dx + load_lanes(&planes.dx[there])) * n.u + (dy + load_lanes(&planes.dy[there])) * n.v);
     const FloatLanes gate = load_lanes(&planes.gate[there]);
     const FloatLanes nothing = {};
-    const FloatLanes known = information > nothing ? all_lanes(n.falloff) : nothing;
+    const FloatLanes known = information > nothing ? all_of_simd(n.falloff) : nothing;
     const FloatLanes agrees = apart <= gate ? (apart >= -gate ? known : nothing) : nothing;
     if (n.near) {
       result.all += known;
@@ -174,14 +174,14 @@ void smooth_cells(CellGrid& grid, Reach reach) {
         Cell& cell = grid.at(first + lane, row);
         if (!cell.matched) continue;
         const float agreeing = quadratics.agreeing[lane];
-        cell.matched = agreeing >= kLeastAgreement * quadratics.all[lane] && agreeing >= kLeastNeighbours;
+        cell.matched = agreeing >= kMinAgreement * quadratics.all[lane] && agreeing >= kMinNeighbours;
         if (!cell.matched) continue;
         cell.plane.d += quadratics.change[0][lane];
         cell.plane.dx += quadratics.change[1][lane];
         cell.plane.dy += quadratics.change[2][lane];
         const float windows = kWindowsPerPixel / static_cast<float>(reach.step * reach.step);
         cell.information =
-            std::min(1e6f, 1 / (std::max(1.0f, windows) * std::max(kLeastScatter, quadratics.scatter[lane]) *
+            std::min(1e6f, 1 / (std::max(1.0f, windows) * std::max(kMinScatter, quadratics.scatter[lane]) *
                                 quadratics.variance[lane]));
       }
     }

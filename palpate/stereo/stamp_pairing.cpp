@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
@@ -18,21 +20,13 @@ double usual_step_s(const std::vector<double>& stamps_s) {
   for (size_t i = 1; i < stamps_s.size(); ++i)
     if (stamps_s[i] > stamps_s[i - 1]) steps.push_back(stamps_s[i] - stamps_s[i - 1]);
   if (steps.empty()) return 0;
-  const auto tenth = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 10);
-  std::nth_element(steps.begin(), tenth, steps.end());
-  const double shortest = *tenth;
+  const double shortest = quantile_of(steps, 0.1);
   // Of the steps that are not longer than one and a half of the shortest, the mean: rounding cancels.
   double sum = 0;
   int count = 0;
   for (const double step : steps)
     if (step <= 1.5 * shortest && step >= 0.5 * shortest) sum += step, ++count;
   return sum / count;
-}
-
-double median(std::vector<double> values) {
-  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), half, values.end());
-  return *half;
 }
 
 }  // namespace
@@ -86,7 +80,7 @@ StampPairing pair_by_stamp(const std::vector<double>& left_s, std::vector<double
     ++next;
   }
   pairing.timing.right_without_left = static_cast<int>(right_s.size() - offsets.size());
-  if (!offsets.empty()) pairing.timing.offset_ms = 1000 * median(offsets);
+  if (!offsets.empty()) pairing.timing.offset_ms = 1000 * median_of(offsets);
   return pairing;
 }
 

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/core/table_text.h"
 
 namespace palpate {
@@ -68,8 +69,7 @@ double seconds_per_unit(const std::filesystem::path& file, const std::vector<Tim
   for (size_t i = 1; i < lines.size(); ++i) steps.push_back(lines[i].time - lines[i - 1].time);
   if (std::all_of(steps.begin(), steps.end(), [](double step) { return step == 1; }))
     throw BadInput(fmt::format("{}: its first column counts frames, expected their times", file.string()));
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  const double step = steps[steps.size() / 2];
+  const double step = median_of(steps);
   for (const double unit : {1.0, 1e-3, 1e-6, 1e-9})
     if (step * unit >= kShortestStep_s && step * unit <= kLongestStep_s) return unit;
   throw BadInput(fmt::format("{}: its times are {:g} apart, expected {:g} to {:g} s in s, ms, us or ns", file.string(),

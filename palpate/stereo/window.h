@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "palpate/stereo/lanes.h"
+#include "palpate/stereo/simd.h"
 
 namespace palpate {
 
@@ -93,13 +93,13 @@ class Window {
       energy += weight_[k] * gradient_[k] * gradient_[k];
     }
     const float sum = total(weights);
-    return sum > kLeastShare * kFullWeight && total(energy) > kLeastGradient * sum;
+    return sum > kMinFraction * kFullWeight && total(energy) > kMinGradient * sum;
   }
 
   /// Gauss-Newton from a predicted plane, gain and offset free in every step, the mean of both images' gradients as in
   /// efficient second-order minimisation. False when the window leaves the other image or the answer leaves the
   /// prediction by more than `most_step` px.
-  bool fit(const Level& to, DisparityPlane predicted, float most_step, float steepest, int iterations,
+  bool fit(const Level& to, DisparityPlane predicted, float max_step, float steepest, int iterations,
            WindowFit& result) {
     result.plane = predicted;
     for (int i = 0; i < iterations; ++i) {
@@ -109,7 +109,7 @@ class Window {
       plane.d += step[0];
       plane.dx += step[1];
       plane.dy += step[2];
-      if (!(std::abs(plane.d - predicted.d) <= most_step && std::abs(plane.dx) <= steepest &&
+      if (!(std::abs(plane.d - predicted.d) <= max_step && std::abs(plane.dx) <= steepest &&
             std::abs(plane.dy) <= steepest))
         return false;
       if (std::abs(step[0]) < 0.02f) break;
@@ -119,8 +119,8 @@ class Window {
 
  private:
   static constexpr int kPairs = 4;
-  static constexpr float kLeastShare = 0.2f;      // of the window's weight
-  static constexpr float kLeastGradient = 0.02f;  // mean square of the gradient, grey levels per px
+  static constexpr float kMinFraction = 0.2f;   // of the window's weight
+  static constexpr float kMinGradient = 0.02f;  // mean square of the gradient, grey levels per px
   static constexpr float kFullWeight = 27.5625f;
 
   // Columns -3..3 and nothing, twice; the row of the first half is 2 k - 3.
@@ -170,7 +170,7 @@ class Window {
     }
     WindowSums sums;
     sums.n = total(n);
-    if (sums.n < kLeastShare * kFullWeight) return false;
+    if (sums.n < kMinFraction * kFullWeight) return false;
     sums.l = total(l), sums.r = total(r), sums.ll = total(ll), sums.rr = total(rr), sums.lr = total(lr);
     sums.g = total(g), sums.gu = total(g * kColumn), sums.gv = total(gv);
     sums.gg = total(gg), sums.ggu = total(gg * kColumn), sums.ggv = total(ggv);

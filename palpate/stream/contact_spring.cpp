@@ -40,8 +40,8 @@ Vec3 force_at(const ContactSpring& spring, const Vec3& moved_mm) {
   const double pressing_N = -force_N.dot(spring.tangent.normal);
   if (pressing_N <= 0) return Vec3::Zero();
   const Vec3 along_N = force_N + pressing_N * spring.tangent.normal;
-  const double most_N = spring.friction * pressing_N, along = along_N.norm();
-  return -pressing_N * spring.tangent.normal + (along > most_N ? most_N / along : 1.0) * along_N;
+  const double max_N = spring.friction * pressing_N, along = along_N.norm();
+  return -pressing_N * spring.tangent.normal + (along > max_N ? max_N / along : 1.0) * along_N;
 }
 
 double stored_energy_Nmm(const ContactSpring& spring, const Mat3& at_onset_N_per_mm, const Vec3& moved_mm) {

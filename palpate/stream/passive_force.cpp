@@ -62,10 +62,10 @@ SteppedForce PassiveForce::step(const Vec3& tip_mm, const Vec3& moved_mm, bool a
     answer.limited = true;
   }
   const Vec3 change_N = force_N - force_N_;
-  const double most_N = limits_.rate_N_per_s * seconds;
+  const double max_N = limits_.rate_N_per_s * seconds;
   // The ramp to zero is never held up.
-  if (answer.valid && change_N.norm() > most_N) {
-    force_N = force_N_ + most_N / change_N.norm() * change_N;
+  if (answer.valid && change_N.norm() > max_N) {
+    force_N = force_N_ + max_N / change_N.norm() * change_N;
     answer.limited = true;
   }
   force_N_ = answer.force_N = force_N;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 
 namespace palpate {
 
@@ -17,9 +18,9 @@ namespace {
 // in which a plane is exactly linear and in which noise acts, because a point moves along its ray only.
 constexpr double kSteepest = 5.0;             // depth per lateral mm; beyond (79 degrees) a slope is a depth edge
 constexpr double kUnknownDeviation_mm = 0.3;  // where the cloud brings none
-constexpr double kLeastDeviation_mm = 0.02;
-constexpr int kFewestPoints = 50;
-constexpr int kFewestForAFit = 12;
+constexpr double kMinDeviation_mm = 0.02;
+constexpr int kMinPoints = 50;
+constexpr int kMinForAFit = 12;
 
 struct Sight {
   double u, v, w;  ///< viewing ray and inverse depth, 1/mm
@@ -66,17 +67,10 @@ std::vector<Sight> sights_of(const PointCloud& cloud) {
     double deviation = has_deviation ? cloud.depth_deviation_mm[i] : kUnknownDeviation_mm;
     if (!std::isfinite(deviation) || deviation <= 0) deviation = kUnknownDeviation_mm;
     const double w = 1 / p.z();
-    sights.push_back({p.x() * w, p.y() * w, w, static_cast<float>(std::max(deviation, kLeastDeviation_mm) * w * w),
+    sights.push_back({p.x() * w, p.y() * w, w, static_cast<float>(std::max(deviation, kMinDeviation_mm) * w * w),
                       static_cast<int>(i)});
   }
   return sights;
-}
-
-template <class Value>
-Value middle(std::vector<Value>& values) {
-  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), half, values.end());
-  return *half;
 }
 
 /// Cells of a third of the spacing at the middle depth.
@@ -93,10 +87,10 @@ SightGrid make_grid(std::vector<Sight> sights, double spacing_mm) {
     v_max = std::max(v_max, s.v);
     depths.push_back(s.w);
   }
-  constexpr double kMostCells = 4e6;
-  grid.pitch =
-      std::max({spacing_mm / 3 * middle(depths), std::sqrt((u_max - grid.u_min) * (v_max - grid.v_min) / kMostCells),
-                (u_max - grid.u_min) / kMostCells, (v_max - grid.v_min) / kMostCells, 1e-9});
+  constexpr double kMaxCells = 4e6;
+  grid.pitch = std::max({spacing_mm / 3 * median_in_place(depths),
+                         std::sqrt((u_max - grid.u_min) * (v_max - grid.v_min) / kMaxCells),
+                         (u_max - grid.u_min) / kMaxCells, (v_max - grid.v_min) / kMaxCells, 1e-9});
   grid.columns = static_cast<int>((u_max - grid.u_min) / grid.pitch) + 1;
   grid.rows = static_cast<int>((v_max - grid.v_min) / grid.pitch) + 1;
   grid.first.assign(static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows) + 1, 0);
@@ -124,7 +118,7 @@ std::vector<Cell> coarse_surface(const SightGrid& grid) {
       Cell& cell = cells[c];
       around.clear();
       grid.for_each_around(row, column, 1, [&](const Sight& s) { around.push_back(static_cast<float>(s.w)); });
-      cell.w0 = static_cast<double>(middle(around));
+      cell.w0 = static_cast<double>(median_in_place(around));
       for (int i = begin; i < end; ++i) {
         cell.u0 += grid.sights[static_cast<size_t>(i)].u / (end - begin);
         cell.v0 += grid.sights[static_cast<size_t>(i)].v / (end - begin);
@@ -164,9 +158,9 @@ void find_slopes(const SightGrid& grid, std::vector<Cell>& cells) {
     if (steep[c]) cells[c].valid = false;
 }
 
-/// Drops the share of points that stand farthest from their neighbourhood, in units of their own deviation, and all
+/// Drops the fraction of points that stand farthest from their neighbourhood, in units of their own deviation, and all
 /// points of invalid cells.
-std::vector<Sight> without_outliers(const SightGrid& grid, const std::vector<Cell>& cells, double share) {
+std::vector<Sight> without_outliers(const SightGrid& grid, const std::vector<Cell>& cells, double fraction) {
   std::vector<float> isolation(grid.sights.size(), -1);
   tbb::parallel_for(0, grid.rows, [&](int row) {
     for (int column = 0; column < grid.columns; ++column) {
@@ -186,7 +180,7 @@ std::vector<Sight> without_outliers(const SightGrid& grid, const std::vector<Cel
     if (value >= 0) ranked.push_back(value);
   if (ranked.empty()) return {};
   const size_t kept =
-      std::min(ranked.size() - 1, static_cast<size_t>((1 - share) * static_cast<double>(ranked.size())));
+      std::min(ranked.size() - 1, static_cast<size_t>((1 - fraction) * static_cast<double>(ranked.size())));
   std::nth_element(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(kept), ranked.end());
   const float limit = ranked[kept];
   std::vector<Sight> left;
@@ -255,7 +249,7 @@ Fit fit_surface(const SightGrid& grid, const Cell& sample, double reach_mm) {
   });
   Fit fit;
   fit.points = static_cast<int>(near.size());
-  if (fit.points < kFewestForAFit) return fit;
+  if (fit.points < kMinForAFit) return fit;
   Vec6 c = Vec6::Zero();
   double scale = 0;  // of the residuals in units of the stated deviations; 0 = not known yet
   for (int round = 0; round < 3; ++round) {
@@ -312,18 +306,18 @@ void describe(Settings& settings, SurfaceOptions& options) {
   settings.number("spacing_mm", options.spacing_mm, {0, 50},
                   "distance between the points of the surface; 0 = from the number of elements");
   settings.number("outlier_share", options.outlier_share, {0, 0.5},
-                  "share of the points, those farthest from their neighbourhood, that is dropped");
+                  "fraction of the points, those farthest from their neighbourhood, that is dropped");
   settings.number("largest_hole_mm", options.largest_hole_mm, {0, 1000},
                   "holes in the surface up to this diameter are closed");
 }
 
 PointCloud clean_points(const PointCloud& cloud, double spacing_mm, const SurfaceOptions& options) {
   const auto demand = [&](size_t points) {
-    if (points < static_cast<size_t>(kFewestPoints))
+    if (points < static_cast<size_t>(kMinPoints))
       throw BadInput(
           fmt::format("only {} of {} measured points of the tissue surface are left after cleaning at {:.2f} mm "
                       "spacing, expected at least {}",
-                      points, cloud.size(), spacing_mm, kFewestPoints));
+                      points, cloud.size(), spacing_mm, kMinPoints));
   };
   if (!(spacing_mm > 0)) throw BadInput(fmt::format("spacing_mm is {}, expected above 0", spacing_mm));
   std::vector<Sight> sights = sights_of(cloud);

@@ -7,7 +7,7 @@ namespace palpate {
 
 struct SurfaceOptions {
   double spacing_mm = 0;        ///< distance between points of S*; 0 = from the resolution that n asks for
-  double outlier_share = 0.02;  ///< share of points with the most isolated neighbourhoods that is dropped
+  double outlier_share = 0.02;  ///< fraction of points with the most isolated neighbourhoods that is dropped
   double largest_hole_mm = 15;  ///< holes with a rim shorter than pi times this are closed
 };
 

@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/surface/manifold.h"
 
 namespace palpate {
@@ -110,8 +111,7 @@ Neighbours find_neighbours(const Delaunay& delaunay, const std::vector<Vec3>& po
   std::vector<double> sorted;
   for (double distance : nearest)
     if (distance < 1e300) sorted.push_back(distance);
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  result.spacing_mm = sorted[sorted.size() / 2];
+  result.spacing_mm = median_of(sorted);
   result.of.resize(points.size());
   for_each_edge([&](size_t a, size_t b, double length) {
     if (length > kLongestEdge * result.spacing_mm) return;

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/surface/cocone.h"
 #include "palpate/surface/extend_rim.h"
 #include "palpate/surface/seen_tissue.h"
@@ -39,9 +40,7 @@ double facing_area_mm2(const Surface& surface) {
 double median_depth_mm(const Surface& surface) {
   std::vector<double> depths;
   for (const Vec3& v : surface.vertices_mm) depths.push_back(v.z());
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return median_of(depths);
 }
 
 void add(PointCloud& points, const Vec3& position_mm, float deviation_mm, float correlation, const cv::Vec3b& colour) {

@@ -25,7 +25,7 @@ Vec3 DepthCells::point_mm(const cv::Point& cell) const {
 }
 
 DepthCells make_depth_cells(const PointCloud& cloud, double pitch, const std::vector<Vec3>& covered_rays) {
-  constexpr double kMostCells = 4e6;
+  constexpr double kMaxCells = 4e6;
   DepthCells cells;
   double u_max = -std::numeric_limits<double>::max(), v_max = u_max;
   cells.u_min = cells.v_min = std::numeric_limits<double>::max();
@@ -36,7 +36,7 @@ DepthCells make_depth_cells(const PointCloud& cloud, double pitch, const std::ve
     v_max = std::max(v_max, p.y() / p.z());
   }
   if (cloud.size() == 0) return cells;
-  cells.pitch = std::max(pitch, std::sqrt((u_max - cells.u_min) * (v_max - cells.v_min) / kMostCells));
+  cells.pitch = std::max(pitch, std::sqrt((u_max - cells.u_min) * (v_max - cells.v_min) / kMaxCells));
   const cv::Size size(static_cast<int>((u_max - cells.u_min) / cells.pitch) + 1,
                       static_cast<int>((v_max - cells.v_min) / cells.pitch) + 1);
   cells.w = cv::Mat1f(size, 0.0f);

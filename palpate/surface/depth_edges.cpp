@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 
 /// Cells that a line is fitted over; those nearest to the edge are blurred by the matcher and left out.
-constexpr int kFitted = 6, kFewestFitted = 3, kGuard = 2;
+constexpr int kFitted = 6, kMinFitted = 3, kGuard = 2;
 /// Fraction of the stated deviation that does not cancel between the two sides: errors of neighbours are alike.
 constexpr double kOwnDeviation = 0.5;
 /// A cell nearer than this fraction of a jump to one side belongs to it; two cells are parted by half of it.
@@ -52,12 +52,12 @@ Side continued(const Line& line, int first, int direction, int wanted, double pl
   }
   Side side;
   side.cells = n;
-  if (n < kFewestFitted) return side;
+  if (n < kMinFitted) return side;
   const double mean_x = std::accumulate(x, x + n, 0.0) / n, mean_w = std::accumulate(w, w + n, 0.0) / n;
   double xx = 0, xw = 0, squares = 0;
   for (int i = 0; i < n; ++i) xx += (x[i] - mean_x) * (x[i] - mean_x), xw += (x[i] - mean_x) * (w[i] - mean_w);
-  const double most = kSteepest * line.cells.pitch * mean_w;
-  side.slope = std::clamp(xw / xx, -most, most);
+  const double max = kSteepest * line.cells.pitch * mean_w;
+  side.slope = std::clamp(xw / xx, -max, max);
   side.w = mean_w - side.slope * mean_x;
   for (int i = 0; i < n; ++i) squares += std::pow(w[i] - side.w - side.slope * x[i], 2);
   const double noise = squares / (n - 1.0);
@@ -80,7 +80,7 @@ Step step_between(const Line& line, int before, int after, const EdgeOptions& op
   const double place = 0.5 * (before + after);
   step.left = continued(line, before - kGuard, -1, kFitted, place);
   step.right = continued(line, after + kGuard, 1, kFitted, place);
-  if (step.left.cells < kFewestFitted || step.right.cells < kFewestFitted) return step;
+  if (step.left.cells < kMinFitted || step.right.cells < kMinFitted) return step;
   step.jump_w = step.right.w - step.left.w;
   const double w = std::max(0.5 * (step.left.w + step.right.w), 1e-6);
   const double allowed = std::max(options.min_jump_mm * w * w,
@@ -239,7 +239,7 @@ void close_covered(DepthCells& cells, const EdgeOptions& options) {
       const double place = 0.5 * (before + i);
       const Side left = continued(line, before - kGuard, -1, fitted, place);
       const Side right = continued(line, i + kGuard, 1, fitted, place);
-      if (left.cells < kFewestFitted || right.cells < kFewestFitted) continue;
+      if (left.cells < kMinFitted || right.cells < kMinFitted) continue;
       const double w = std::max(0.5 * (left.w + right.w), 1e-6), gap_mm = gap * cells.size_mm(w);
       // Each side bends while it is not seen: by half the way at most.
       const double allowed = std::max(options.min_jump_mm, 0.5 * gap_mm) * w * w;

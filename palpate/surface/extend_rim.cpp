@@ -8,18 +8,20 @@
 #include <map>
 #include <utility>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
 
 /// Points beside a vertex of the rim that tell how far the surface goes on: so many at least, and so far along the rim.
-constexpr size_t kFewestPoints = 12;
-constexpr double kAlongShare = 0.35;
+constexpr size_t kMinPoints = 12;
+constexpr double kAlongFraction = 0.35;
 /// Of the points outside, the outermost are noise.
-constexpr double kEndShare = 0.95;
+constexpr double kEndFraction = 0.95;
 /// The last stretch of them tells how the surface bends there.
 constexpr double kLastStretch = 0.7;
-constexpr double kMostBendShare = 0.5;
+constexpr double kMaxBendFraction = 0.5;
 
 const Vec3& at(const std::vector<Vec3>& values, int i) {
   return values[static_cast<size_t>(i)];
@@ -44,12 +46,6 @@ std::map<int, Vec3> outward_directions(const Surface& surface) {
   return outward;
 }
 
-double quantile_of(std::vector<double>& values, double share) {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 /// By how much a vertex of the rim moves, from the measured points around it.
 Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal, const std::vector<Vec3>& measured_mm,
                      double reach_mm) {
@@ -59,15 +55,17 @@ Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal
     const Vec3 offset = point - vertex;
     if (std::abs(offset.z()) > reach_mm || offset.squaredNorm() > reach_mm * reach_mm) continue;
     const double away = offset.dot(outward);
-    if (away > 0 && std::abs(offset.dot(along)) < kAlongShare * reach_mm) beyond.emplace_back(away, offset.dot(normal));
+    if (away > 0 && std::abs(offset.dot(along)) < kAlongFraction * reach_mm)
+      beyond.emplace_back(away, offset.dot(normal));
   }
-  if (beyond.size() < kFewestPoints) return Vec3::Zero();
+  if (beyond.size() < kMinPoints) return Vec3::Zero();
   std::vector<double> away, height;
   for (const auto& [outwards, above] : beyond) away.push_back(outwards);
-  const double end_mm = quantile_of(away, kEndShare);
+  const double end_mm = quantile_of(away, kEndFraction);
   for (const auto& [outwards, above] : beyond)
     if (outwards > kLastStretch * end_mm) height.push_back(above);
-  const double bend_mm = std::clamp(quantile_of(height, 0.5), -kMostBendShare * reach_mm, kMostBendShare * reach_mm);
+  const double bend_mm =
+      std::clamp(quantile_of(height, 0.5), -kMaxBendFraction * reach_mm, kMaxBendFraction * reach_mm);
   return end_mm * outward + bend_mm * normal;
 }
 

@@ -22,7 +22,7 @@ constexpr double kLooksAway = 0.5;  // cosine between outward normal and viewing
 void select_underside(const TetMesh& mesh, double depth_mm, std::vector<char>& selected) {
   struct Face {
     std::array<Vec3, 3> corners;
-    Vec3 least, most;
+    Vec3 min, max;
   };
   std::vector<Face> underside;
   for (const Triangle& t : boundary_triangles(mesh)) {
@@ -37,7 +37,7 @@ void select_underside(const TetMesh& mesh, double depth_mm, std::vector<char>& s
   for (size_t i = 0; i < mesh.nodes_mm.size(); ++i) {
     const Vec3& p = mesh.nodes_mm[i];
     selected[i] |= std::any_of(underside.begin(), underside.end(), [&](const Face& face) {
-      return (p.array() >= face.least.array()).all() && (p.array() <= face.most.array()).all() &&
+      return (p.array() >= face.min.array()).all() && (p.array() <= face.max.array()).all() &&
              closest_point_on_triangle(p, face.corners[0], face.corners[1], face.corners[2]).distance <= depth_mm;
     });
   }
@@ -165,12 +165,12 @@ std::vector<int> select_attachments(const TetMesh& mesh, const AttachmentOptions
   for (size_t i = 0; i < selected.size(); ++i)
     if (selected[i]) nodes.push_back(static_cast<int>(i));
   if (nodes.empty() || nodes.size() == mesh.nodes_mm.size()) {
-    Vec3 least = Vec3::Constant(1e300), most = -least;
-    for (const Vec3& node : mesh.nodes_mm) least = least.cwiseMin(node), most = most.cwiseMax(node);
+    Vec3 min = Vec3::Constant(1e300), max = -min;
+    for (const Vec3& node : mesh.nodes_mm) min = min.cwiseMin(node), max = max.cwiseMax(node);
     throw BadInput(fmt::format(
         "attachments: {} of {} nodes selected, expected some but not all; the tissue lies in x {:.1f}..{:.1f}, y "
         "{:.1f}..{:.1f}, z {:.1f}..{:.1f} mm of the left camera frame",
-        nodes.size(), mesh.nodes_mm.size(), least.x(), most.x(), least.y(), most.y(), least.z(), most.z()));
+        nodes.size(), mesh.nodes_mm.size(), min.x(), max.x(), min.y(), max.y(), min.z(), max.z()));
   }
   return nodes;
 }

@@ -36,7 +36,7 @@ double dihedral_deg(const std::vector<Vec3>& nodes, const Tetrahedron& t) {
 }
 
 /// Takes back moves, by halves and then wholly, at elements that they would spoil.
-void apply(TetMesh& mesh, std::vector<Vec3> moved, double least_dihedral_deg) {
+void apply(TetMesh& mesh, std::vector<Vec3> moved, double min_dihedral_deg) {
   const std::vector<Vec3> rest = mesh.nodes_mm;
   for (bool is_spoilt = true; is_spoilt;) {
     is_spoilt = false;
@@ -46,7 +46,7 @@ void apply(TetMesh& mesh, std::vector<Vec3> moved, double least_dihedral_deg) {
           t.begin(), t.end(), [&](int n) { return moved[static_cast<size_t>(n)] != rest[static_cast<size_t>(n)]; });
       if (!has_moved) continue;
       const double before = dihedral_deg(rest, t);
-      if (dihedral_deg(moved, t) >= std::min(before, least_dihedral_deg)) continue;
+      if (dihedral_deg(moved, t) >= std::min(before, min_dihedral_deg)) continue;
       for (int n : t) retreats[static_cast<size_t>(n)] = 1;
       is_spoilt = true;
     }
@@ -61,7 +61,7 @@ void apply(TetMesh& mesh, std::vector<Vec3> moved, double least_dihedral_deg) {
 
 }  // namespace
 
-void fit_boundary(TetMesh& mesh, const InsideTest& inside, double least_dihedral_deg) {
+void fit_boundary(TetMesh& mesh, const InsideTest& inside, double min_dihedral_deg) {
   const std::vector<Triangle> boundary = boundary_triangles(mesh);
   std::vector<Vec3> moved = mesh.nodes_mm;
   std::vector<double> edge(moved.size(), 1e300);  // shortest one on the boundary
@@ -87,20 +87,20 @@ void fit_boundary(TetMesh& mesh, const InsideTest& inside, double least_dihedral
         const std::optional<double> distance = gap(inside, q, outwards, reach);
         if (!distance) continue;
         for (size_t k = 0; k < 3; ++k) {
-          const double share = barycentric[static_cast<Eigen::Index>(k)] * doubled_area.norm();
-          pull[static_cast<size_t>(t[k])] += share * *distance;
-          weight[static_cast<size_t>(t[k])] += share;
+          const double fraction = barycentric[static_cast<Eigen::Index>(k)] * doubled_area.norm();
+          pull[static_cast<size_t>(t[k])] += fraction * *distance;
+          weight[static_cast<size_t>(t[k])] += fraction;
         }
       }
     }
     for (size_t i = 0; i < moved.size(); ++i) {
       if (weight[i] <= 0) continue;
-      const double most = kLargestMove * edge[i];
+      const double max = kLargestMove * edge[i];
       const double so_far = (moved[i] - mesh.nodes_mm[i]).dot(normals[i]);
-      moved[i] = mesh.nodes_mm[i] + std::clamp(so_far + pull[i] / weight[i], -most, most) * normals[i];
+      moved[i] = mesh.nodes_mm[i] + std::clamp(so_far + pull[i] / weight[i], -max, max) * normals[i];
     }
   }
-  apply(mesh, std::move(moved), least_dihedral_deg);
+  apply(mesh, std::move(moved), min_dihedral_deg);
 }
 
 }  // namespace palpate

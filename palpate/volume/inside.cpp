@@ -21,22 +21,22 @@ double orientation(const Vec3& a, const Vec3& b, double x, double y) {
 
 InsideTest::InsideTest(const Surface& closed) {
   triangles_.reserve(closed.triangles.size());
-  Vec3 least = Vec3::Constant(1e300), most = -least;
+  Vec3 min = Vec3::Constant(1e300), max = -min;
   for (const Triangle& t : closed.triangles) {
     Column column;
     for (size_t k = 0; k < 3; ++k) {
       column.corners[k] = closed.vertices_mm[static_cast<size_t>(t[k])];
-      least = least.cwiseMin(column.corners[k]);
-      most = most.cwiseMax(column.corners[k]);
+      min = min.cwiseMin(column.corners[k]);
+      max = max.cwiseMax(column.corners[k]);
     }
     triangles_.push_back(column);
   }
   const int side = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(triangles_.size()))), 1, 512);
   columns_ = rows_ = side;
-  x_min_ = least.x();
-  y_min_ = least.y();
-  pitch_x_ = std::max(most.x() - least.x(), 1e-9) / side;
-  pitch_y_ = std::max(most.y() - least.y(), 1e-9) / side;
+  x_min_ = min.x();
+  y_min_ = min.y();
+  pitch_x_ = std::max(max.x() - min.x(), 1e-9) / side;
+  pitch_y_ = std::max(max.y() - min.y(), 1e-9) / side;
   const auto for_each_bucket = [&](const Column& t, auto visit) {
     const auto [x0, x1] = std::minmax({t.corners[0].x(), t.corners[1].x(), t.corners[2].x()});
     const auto [y0, y1] = std::minmax({t.corners[0].y(), t.corners[1].y(), t.corners[2].y()});

@@ -15,19 +15,19 @@ double smallest_dihedral_deg(const Vec3& a, const Vec3& b, const Vec3& c, const 
   if (!(signed_volume_mm3(a, b, c, d) > 0)) return 0;
   const std::array<Vec3, 4> inwards = {(d - b).cross(c - b).normalized(), (c - a).cross(d - a).normalized(),
                                        (d - a).cross(b - a).normalized(), (b - a).cross(c - a).normalized()};
-  double most = -1;
+  double max = -1;
   for (size_t i = 0; i < 4; ++i)
-    for (size_t j = i + 1; j < 4; ++j) most = std::max(most, -inwards[i].dot(inwards[j]));
-  return std::acos(std::clamp(most, -1.0, 1.0)) * 180 / std::numbers::pi;
+    for (size_t j = i + 1; j < 4; ++j) max = std::max(max, -inwards[i].dot(inwards[j]));
+  return std::acos(std::clamp(max, -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
 double smallest_dihedral_deg(const TetMesh& mesh) {
-  double least = 180;
+  double min = 180;
   for (const Tetrahedron& t : mesh.tetrahedra) {
     const auto node = [&](size_t k) -> const Vec3& { return mesh.nodes_mm[static_cast<size_t>(t[k])]; };
-    least = std::min(least, smallest_dihedral_deg(node(0), node(1), node(2), node(3)));
+    min = std::min(min, smallest_dihedral_deg(node(0), node(1), node(2), node(3)));
   }
-  return mesh.tetrahedra.empty() ? 0 : least;
+  return mesh.tetrahedra.empty() ? 0 : min;
 }
 
 namespace {

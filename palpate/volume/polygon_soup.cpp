@@ -65,9 +65,9 @@ int linear_type(int type) {
 }
 
 int corners_of(const std::vector<std::vector<int>>& faces) {
-  int most = 0;
-  for (const std::vector<int>& face : faces) most = std::max(most, *std::max_element(face.begin(), face.end()));
-  return most + 1;
+  int max = 0;
+  for (const std::vector<int>& face : faces) max = std::max(max, *std::max_element(face.begin(), face.end()));
+  return max + 1;
 }
 
 void add_polygon(const std::vector<int>& polygon, Surface& surface) {

@@ -12,6 +12,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/core/quantile.h"
+
 namespace palpate {
 
 namespace {
@@ -24,7 +26,7 @@ constexpr size_t kPointsToStart = 300, kPointsToFinish = 2000;
 constexpr int kRoundsToStart = 25, kRoundsToFinish = 60;
 constexpr double kTurn = std::numbers::pi / 7;  // between starts
 constexpr double kFarthest_mm = 5;              // beyond, a point counts as not matched
-constexpr double kLeastScale_mm = 0.2;
+constexpr double kMinScale_mm = 0.2;
 constexpr double kEdgeOn = -0.05;  // cosine between normal and viewing ray of a face that can be seen
 
 Kernel::Point_3 point(const Vec3& p) {
@@ -84,9 +86,8 @@ double scale_of(const std::vector<Pair>& pairs) {
   for (const Pair& pair : pairs)
     if (pair.is_seen) distances.push_back(std::abs(pair.normal.dot(pair.seen - pair.on_body)));
   if (distances.empty()) return kFarthest_mm;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return std::max(kLeastScale_mm, 1.5 * *middle);
+  const auto middle = median_of(distances);
+  return std::max(kMinScale_mm, 1.5 * middle);
 }
 
 /// One Gauss-Newton step on the distances along the normals; returns how far it moved the points, mm.
@@ -136,9 +137,9 @@ Registration iterate(const Body& body, const std::vector<Vec3>& seen, Registrati
   return motion;
 }
 
-std::vector<Vec3> every_nth(const std::vector<Vec3>& points, size_t most) {
+std::vector<Vec3> every_nth(const std::vector<Vec3>& points, size_t max) {
   std::vector<Vec3> result;
-  for (size_t i = 0; i < points.size(); i += points.size() / most + 1) result.push_back(points[i]);
+  for (size_t i = 0; i < points.size(); i += points.size() / max + 1) result.push_back(points[i]);
   return result;
 }
 
@@ -179,11 +180,11 @@ Registration register_body(const Surface& body, const std::vector<Vec3>& seen_mm
         starts.push_back(with_equal_middles(body, few, Eigen::AngleAxisd(angle, Vec3::Unit(axis)).toRotationMatrix()));
   }
   Registration best;
-  double least_mm = 1e300;
+  double min_mm = 1e300;
   for (const Registration& first : starts) {
     const Registration motion = iterate(faces, few, first, kRoundsToStart);
     const double found_mm = cost_mm(pairs_of(faces, few, motion));
-    if (found_mm < least_mm) least_mm = found_mm, best = motion;
+    if (found_mm < min_mm) min_mm = found_mm, best = motion;
   }
   best = iterate(faces, many, best, kRoundsToFinish);
   double sum = 0, matched = 0;
@@ -194,7 +195,7 @@ Registration register_body(const Surface& body, const std::vector<Vec3>& seen_mm
     ++matched;
   }
   best.residual_mm = matched > 0 ? std::sqrt(sum / matched) : kFarthest_mm;
-  best.matched_share = matched / static_cast<double>(many.size());
+  best.matched_fraction = matched / static_cast<double>(many.size());
   return best;
 }
 

@@ -11,7 +11,7 @@ struct Registration {
   Mat3 left_from_volume = Mat3::Identity();
   Vec3 left_from_volume_mm = Vec3::Zero();  ///< p_left = left_from_volume * p + left_from_volume_mm
   double residual_mm = 0;                   ///< root mean square distance of the matched points to the body
-  double matched_share = 0;                 ///< of the points: near a side of the body that looks at the camera
+  double matched_fraction = 0;              ///< of the points: near a side of the body that looks at the camera
 
   Vec3 apply(const Vec3& p) const { return left_from_volume * p + left_from_volume_mm; }
 };

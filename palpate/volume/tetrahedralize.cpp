@@ -33,7 +33,7 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 constexpr double kWorstDihedral_deg = 10;
 constexpr double kAimedDihedral_deg = 12;  // perturbation and exudation stop here
 constexpr double kCountTolerance = 0.1;
-constexpr int kMostMeshings = 8;
+constexpr int kMaxMeshings = 8;
 
 /// Cell size, as CGAL asks for it: 1 away from the focus, `edge_ratio` inside, growing by a third of the distance.
 struct SizeField {
@@ -54,14 +54,14 @@ struct SizeField {
 };
 
 struct Box {
-  Vec3 least, most;
+  Vec3 min, max;
 };
 
 Box bounds(const Surface& surface) {
   Box box{Vec3::Constant(1e300), Vec3::Constant(-1e300)};
   for (const Vec3& v : surface.vertices_mm) {
-    box.least = box.least.cwiseMin(v);
-    box.most = box.most.cwiseMax(v);
+    box.min = box.min.cwiseMin(v);
+    box.max = box.max.cwiseMax(v);
   }
   return box;
 }
@@ -169,13 +169,13 @@ TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::opti
   if (!(volume > 0))
     throw BadInput(fmt::format("the body encloses {:.3g} mm^3, expected a closed surface oriented outwards", volume));
   const Box box = bounds(closed_body);
-  const double margin = 0.01 * (box.most - box.least).norm();
+  const double margin = 0.01 * (box.max - box.min).norm();
   const InsideTest inside(closed_body);
   const auto outside_value = [&inside](const Kernel::Point_3& p) { return inside({p.x(), p.y(), p.z()}) ? -1.0 : 1.0; };
   const Domain domain = Domain::create_implicit_mesh_domain(
       outside_value,
-      CGAL::Bbox_3(box.least.x() - margin, box.least.y() - margin, box.least.z() - margin, box.most.x() + margin,
-                   box.most.y() + margin, box.most.z() + margin),
+      CGAL::Bbox_3(box.min.x() - margin, box.min.y() - margin, box.min.z() - margin, box.max.x() + margin,
+                   box.max.y() + margin, box.max.z() + margin),
       CGAL::parameters::relative_error_bound = 1e-5);
 
   const double guess_mm = std::cbrt(4.8 * volume / elements);
@@ -187,13 +187,13 @@ TetMesh tetrahedralize(const Surface& closed_body, int elements, const std::opti
   TetMesh best;
   MeshReport best_report;
   double best_fault = 1e300;
-  for (int meshing = 1; meshing <= kMostMeshings; ++meshing) {
+  for (int meshing = 1; meshing <= kMaxMeshings; ++meshing) {
     const double size_mm = search.size_mm();
     Complex complex = refine(domain, start, size_mm, focus);
     const size_t refined = complex.number_of_cells_in_complex();
     const bool is_near = error(refined) <= 0.7 * kCountTolerance;
     search.tried(static_cast<int>(refined));
-    if (refined == 0 || (!is_near && meshing < kMostMeshings)) continue;
+    if (refined == 0 || (!is_near && meshing < kMaxMeshings)) continue;
     TetMesh mesh = finish(complex, domain, inside);
     const double dihedral = smallest_dihedral_deg(mesh);
     const bool has_count = error(mesh.tetrahedra.size()) <= kCountTolerance;

@@ -20,7 +20,7 @@ namespace {
 constexpr uint64_t kLargestArray_bytes = uint64_t{1} << 31;
 
 /// No data, not even zeros alone, are packed into less.
-constexpr uint64_t kMostPacking = 10000;
+constexpr uint64_t kMaxPacking = 10000;
 
 uint64_t header_number(MeshBytes& bytes, size_t header_bytes, bool swapped) {
   return header_bytes == 8 ? bytes.binary<uint64_t>(swapped) : bytes.binary<uint32_t>(swapped);
@@ -91,7 +91,7 @@ std::string unpacked(std::string_view bytes, const std::string& compressor, size
   for (size_t i = 0; i < packed_sizes.size(); ++i) {
     const size_t size = i + 1 == packed_sizes.size() && last > 0 ? last : block;
     const std::string_view packed = in.take(packed_sizes[i]);
-    if (size > kMostPacking * packed.size() + 4096) throw BadInput("the header of an array is broken");
+    if (size > kMaxPacking * packed.size() + 4096) throw BadInput("the header of an array is broken");
     result.resize(result.size() + size);
     if (!inflate_block(packed, compressor, result.data() + result.size() - size, size))
       throw BadInput("compressed data are broken");

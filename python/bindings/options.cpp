@@ -55,7 +55,7 @@ void add_options(py::module_& module) {
             }
             throw py::value_error("law: '" + name + "' is none of " + names);
           },
-          "saint-venant-kirchhoff, neo-hookean, corotated or linear")
+          "saint-venant-kirchhoff, saint-venant-kirchhoff-barrier, neo-hookean, corotated or linear")
       .def_readwrite("young_modulus_kPa", &TissueOptions::young_modulus_kPa, "Young's modulus, kPa")
       .def_readwrite("poisson_ratio", &TissueOptions::poisson_ratio, "Poisson's ratio, 0 to 0.5")
       .def("__str__", &yaml_of<TissueOptions>);

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <filesystem>
 #include <regex>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "tests/app/program.h"
 
@@ -48,6 +51,46 @@ TEST(SafetyPage, HasATestForEveryHazard) {
     EXPECT_TRUE(std::regex_search(row, kNamed)) << row;
   }
   EXPECT_GT(rows, 20);
+}
+
+/// As GitHub and mkdocs make it of a heading.
+std::string anchor_of(const std::string& heading) {
+  std::string anchor;
+  for (const char c : heading)
+    if (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-')
+      anchor += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    else if (c == ' ')
+      anchor += '-';
+  return anchor;
+}
+
+std::set<std::string> anchors_of(const std::string& page) {
+  static const std::regex kHeading(R"((?:^|\n)#+ ([^\n]+))");
+  std::set<std::string> anchors;
+  for (std::sregex_iterator it(page.begin(), page.end(), kHeading), end; it != end; ++it)
+    anchors.insert(anchor_of((*it)[1]));
+  return anchors;
+}
+
+TEST(Pages, EveryLinkBetweenThemLeadsSomewhere) {
+  static const std::regex kLink(R"(\]\(([^)#:\s]*)(#[^)\s]+)?\))");
+  std::vector<std::filesystem::path> pages = {kSource / "README.md", kSource / "CONTRIBUTING.md",
+                                              kSource / "CHANGELOG.md"};
+  for (const auto& entry : std::filesystem::directory_iterator(kSource / "docs"))
+    if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  int links = 0;
+  for (const std::filesystem::path& page : pages) {
+    const std::string text = read_file(page);
+    for (std::sregex_iterator it(text.begin(), text.end(), kLink), end; it != end; ++it, ++links) {
+      const std::string file = (*it)[1], anchor = (*it)[2];
+      const std::filesystem::path target = file.empty() ? page : page.parent_path() / file;
+      ASSERT_TRUE(std::filesystem::exists(target)) << page << " leads to " << file;
+      if (!anchor.empty() && target.extension() == ".md") {
+        EXPECT_TRUE(anchors_of(read_file(target)).count(anchor.substr(1))) << page << " leads to " << file << anchor;
+      }
+    }
+  }
+  EXPECT_GT(links, 60);
 }
 
 TEST(ContributingPage, NamesFilesThatExist) {

@@ -36,7 +36,8 @@ TEST(Program, WithoutAVerbItSaysWhatItCanDoAndEndsWithTwo) {
 }
 
 TEST(Program, EveryVerbHasHelpWithAnExample) {
-  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console"}) {
+  for (const char* verb :
+       {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console", "benchmark export"}) {
     const Outcome outcome = run_palpate(std::string(verb) + " --help");
     EXPECT_EQ(outcome.exit_code, 0) << verb;
     EXPECT_THAT(outcome.output, HasSubstr("Example: palpate")) << verb;
@@ -46,7 +47,8 @@ TEST(Program, EveryVerbHasHelpWithAnExample) {
 TEST(Program, HelpSaysWhereAPathIsMeant) {
   EXPECT_THAT(run_palpate("estimate --help").output,
               testing::AllOf(HasSubstr("scene SCENE"), HasSubstr("FOLDER"), HasSubstr("--truth FILE")));
-  for (const char* verb : {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console"})
+  for (const char* verb :
+       {"demo", "simulate", "map", "estimate", "compare", "check", "modulus", "study", "console", "benchmark export"})
     EXPECT_THAT(run_palpate(std::string(verb) + " --help").output, testing::Not(HasSubstr("TEXT"))) << verb;
 }
 
@@ -72,6 +74,16 @@ TEST(Program, CheckTellsWhatItReadInJson) {
   EXPECT_EQ(json["attachments"], nlohmann::json({"underside"}));
   EXPECT_EQ(json["tissue"]["law"], "saint-venant-kirchhoff");
   EXPECT_EQ(json["tissue"]["young_modulus_kPa"], 27);
+}
+
+TEST(Program, CheckNamesTheLawThatAPushNeeds) {
+  const Workspace workspace;
+  write_plane_recording(workspace / "in", 3);
+  const auto scene = workspace / "in/scene.yaml";
+  EXPECT_THAT(run_palpate("check " + scene.string()).output, testing::Not(HasSubstr("advice")));
+  replace_in_file(scene, "grip: grasp", "grip: push");
+  EXPECT_THAT(run_palpate("check " + scene.string()).output,
+              testing::AllOf(HasSubstr("advice: tissue.law"), HasSubstr("saint-venant-kirchhoff-barrier")));
 }
 
 TEST(Program, CheckSaysWhyAVideoWithoutInstrumentCannotPlaceATipTrack) {

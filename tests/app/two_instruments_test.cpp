@@ -80,9 +80,9 @@ TEST(TwoInstruments, HoldTheSameBodyAndHaveEachTheirOwnForce) {
   ASSERT_EQ(truth[after].tip_mm, truth[before].tip_mm);
   EXPECT_GT(true_change_N.norm(), 0.05);
   const Vec3 change_N = found[after].force_N - found[before].force_N;
-  const double share = change_N.dot(true_change_N) / true_change_N.squaredNorm();
-  EXPECT_GT(share, 0.5);
-  EXPECT_LT(share, 2) << "through a body that is known by its front and its thickness";
+  const double fraction = change_N.dot(true_change_N) / true_change_N.squaredNorm();
+  EXPECT_GT(fraction, 0.5);
+  EXPECT_LT(fraction, 2) << "through a body that is known by its front and its thickness";
   // When the second lets go, the first one's force does not jump.
   for (size_t frame = 28; frame < 33; ++frame)
     EXPECT_LT((found[frame].force_N - truth[frame].force_N).norm(), 0.16 * truth[frame].force_N.norm()) << frame;

@@ -152,7 +152,7 @@ TEST(Equilibrium, GoesOnWhereItRanOutOfSolves) {
   const Block block;
   const TetModel model = block.model_of(Law::neo_hookean, 27);
   const Footprint footprint = make_footprint(model, block.boundary, {20, 20, 0}, 4);
-  EquilibriumSolver hurried(model, {.most_solves = 44}), patient(model);
+  EquilibriumSolver hurried(model, {.max_solves = 44}), patient(model);
   hurried.hold(footprint);
   patient.hold(footprint);
   const Vec3 p(1.2, 0, 1.5);
@@ -245,7 +245,7 @@ TEST(TwoContacts, OneThatBeginsOnDisplacedTissueBeginsWithoutForceAndLeavesNoTra
   const Equilibrium held = joined.solve_all({p, q});
   ASSERT_TRUE(held.converged);
   EXPECT_GT(held.contacts[1].force_N.dot(q), 0);
-  joined.let_go(1);
+  joined.release(1);
   const Equilibrium after = joined.solve(p);
   ASSERT_TRUE(after.converged);
   EXPECT_LT((after.u - before.u).lpNorm<Eigen::Infinity>(), 1e-6);
@@ -259,7 +259,7 @@ TEST(TwoContacts, TheSecondStaysWhereItIsWhenTheFirstLetsGo) {
   solver.hold_also(two.right);
   const Vec3 p(0, 0, -3), q(1, -1, -1);
   solver.solve_all({p, q});
-  solver.let_go(0);
+  solver.release(0);
   const Equilibrium left_over = solver.solve(q);
   EquilibriumSolver alone(two.model, {.relative_residual = 1e-9});
   alone.hold(two.right);

@@ -87,12 +87,12 @@ TEST(Gestures, AThousandAtRandomEachConvergeOrSayThatTheyDoNot) {
     tbb::parallel_for(size_t{0}, gestures.size(), [&](size_t i) { ends[i] = run(gestures[i], law); });
     fmt::print("{:22}", law_name(law));
     for (size_t e = 0; e < kEnds.size(); ++e) {
-      const double share = static_cast<double>(std::count(ends.begin(), ends.end(), static_cast<End>(e))) /
-                           static_cast<double>(ends.size());
-      fmt::print("  {} {:.1f} %", kEnds[e], 100 * share);
+      const double fraction = static_cast<double>(std::count(ends.begin(), ends.end(), static_cast<End>(e))) /
+                              static_cast<double>(ends.size());
+      fmt::print("  {} {:.1f} %", kEnds[e], 100 * fraction);
       std::string key = law_name(law) + "_" + kEnds[e];
       std::replace(key.begin(), key.end(), '-', '_');
-      RecordProperty(key, fmt::format("{:.3f}", share));
+      RecordProperty(key, fmt::format("{:.3f}", fraction));
     }
     fmt::print("\n");
     EXPECT_EQ(std::count(ends.begin(), ends.end(), End::unsound), 0) << law_name(law);

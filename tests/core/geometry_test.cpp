@@ -22,7 +22,7 @@ TEST(Geometry, TheBoundaryOfABoxIsClosedOutwardAndHasItsVolume) {
 
 TEST(Geometry, NoPointOfATriangleIsNearerThanTheClosestOne) {
   std::mt19937 random(4);
-  std::uniform_real_distribution<double> uniform(-1, 1), share(0, 1);
+  std::uniform_real_distribution<double> uniform(-1, 1), fraction(0, 1);
   const auto point = [&] { return Vec3(uniform(random), uniform(random), uniform(random)); };
   for (int trial = 0; trial < 200; ++trial) {
     const Vec3 a = point(), b = point(), c = point(), p = 2 * point();
@@ -30,7 +30,7 @@ TEST(Geometry, NoPointOfATriangleIsNearerThanTheClosestOne) {
     EXPECT_NEAR(nearest.barycentric.sum(), 1, 1e-12);
     EXPECT_GE(nearest.barycentric.minCoeff(), -1e-12);
     for (int i = 0; i < 50; ++i) {
-      double v = share(random), w = share(random);
+      double v = fraction(random), w = fraction(random);
       if (v + w > 1) v = 1 - v, w = 1 - w;
       EXPECT_GE((p - ((1 - v - w) * a + v * b + w * c)).norm(), nearest.distance - 1e-12);
     }

@@ -112,7 +112,7 @@ Eigen::VectorXd relax(const TetModel& model, const Eigen::VectorXd& imposed, con
 
 /// Force of a rigid, frictionless, flat round punch over that of the half-space, 2 a E d / (1 - nu^2) (Sneddon 1965).
 /// The outer faces move as the half-space does there, so that the block's size does not count.
-double share_of_the_half_spaces_force(int sectors, double nu, Element element) {
+double fraction_of_the_half_spaces_force(int sectors, double nu, Element element) {
   const TetMesh mesh = quarter_block(sectors);
   const TetModel model(mesh, {Law::linear, 27, nu, ""}, {}, element);
   const double E_MPa = model.tissue().young_modulus_MPa();
@@ -140,8 +140,8 @@ double share_of_the_half_spaces_force(int sectors, double nu, Element element) {
 
 /// The pressure is singular at the rim, so the force converges with the first power of the edge.
 void expect_convergence(int sectors, double nu, Element element) {
-  const double coarse = share_of_the_half_spaces_force(sectors / 2, nu, element),
-               fine = share_of_the_half_spaces_force(sectors, nu, element);
+  const double coarse = fraction_of_the_half_spaces_force(sectors / 2, nu, element),
+               fine = fraction_of_the_half_spaces_force(sectors, nu, element);
   ::testing::Test::RecordProperty("coarse", fmt::format("{:.4f}", coarse));
   ::testing::Test::RecordProperty("fine", fmt::format("{:.4f}", fine));
   EXPECT_NEAR(fine, 1, 0.02) << "nu = " << nu;

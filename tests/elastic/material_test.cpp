@@ -8,7 +8,8 @@
 namespace palpate {
 namespace {
 
-const Law kLaws[] = {Law::saint_venant_kirchhoff, Law::neo_hookean, Law::corotated, Law::linear};
+const Law kLaws[] = {Law::saint_venant_kirchhoff, Law::saint_venant_kirchhoff_barrier, Law::neo_hookean, Law::corotated,
+                     Law::linear};
 
 Lame liver() {
   return lame_of({Law::saint_venant_kirchhoff, 27, 0.45, ""});
@@ -94,7 +95,7 @@ TEST(Material, TheBulkEnergyAndTheRestMakeTheWholeLaw) {
 TEST(Material, ARotationCarriesTheStressAlong) {
   std::mt19937 random(3);
   const Mat3 R = Eigen::AngleAxisd(0.7, Vec3(1, 2, -1).normalized()).toRotationMatrix();
-  for (Law law : {Law::saint_venant_kirchhoff, Law::neo_hookean, Law::corotated}) {
+  for (Law law : {Law::saint_venant_kirchhoff, Law::saint_venant_kirchhoff_barrier, Law::neo_hookean, Law::corotated}) {
     SCOPED_TRACE(law_name(law));
     EXPECT_LT(first_piola_stress(law, liver(), R).norm(), 1e-15);
     const Mat3 F = random_gradient(random);
@@ -150,13 +151,13 @@ struct Bar {
 
 /// Bisection on the lateral stretch, on which the lateral stress of every law rises.
 Bar stretched_bar(Law law, const Lame& lame, double stretch) {
-  double least = 0.3, most = 1.7;
+  double min = 0.3, max = 1.7;
   Bar bar;
   for (int i = 0; i < 60; ++i) {
-    bar.lateral_stretch = 0.5 * (least + most);
+    bar.lateral_stretch = 0.5 * (min + max);
     const Mat3 F = Vec3(stretch, bar.lateral_stretch, bar.lateral_stretch).asDiagonal();
     const Mat3 P = first_piola_stress(law, lame, F);
-    (P(1, 1) > 0 ? most : least) = bar.lateral_stretch;
+    (P(1, 1) > 0 ? max : min) = bar.lateral_stretch;
     const Mat3 sigma = cauchy_stress(law, lame, F);
     bar.nominal_MPa = P(0, 0);
     bar.cauchy_MPa = sigma(0, 0);
@@ -246,6 +247,28 @@ TEST(Material, TheLawsSayWhereTheyEnd) {
   };
   EXPECT_LT(stress(0.58), stress(0.60));
   EXPECT_LT(stress(0.575), stress(0.55));
+}
+
+TEST(Material, WithItsBarrierThePapersLawResistsEveryCompressionAndIsTheSameInTension) {
+  const Law plain = Law::saint_venant_kirchhoff, barrier = Law::saint_venant_kirchhoff_barrier;
+  for (const double nu : {0.0, 0.3, 0.45, 0.49, 0.499}) {
+    const Lame lame = lame_of({barrier, 27, nu, ""});
+    EXPECT_EQ(first_piola_stress(barrier, lame, Mat3(Vec3(1.3, 0.95, 0.95).asDiagonal())),
+              first_piola_stress(plain, lame, Mat3(Vec3(1.3, 0.95, 0.95).asDiagonal())));
+    double confined_before = 0, free_before = 0;
+    for (double stretch = 0.99; stretch > 0.05; stretch -= 0.01) {
+      const double confined = first_piola_stress(barrier, lame, Mat3(Vec3(stretch, 1, 1).asDiagonal()))(0, 0);
+      EXPECT_LT(confined, confined_before) << "nu " << nu << ", confined to " << stretch;
+      confined_before = confined;
+      if (stretch < 0.2) continue;
+      const double to_the_sides_free = stretched_bar(barrier, lame, stretch).nominal_MPa;
+      EXPECT_LT(to_the_sides_free, free_before) << "nu " << nu << ", to " << stretch;
+      free_before = to_the_sides_free;
+    }
+    const double slight = first_piola_stress(barrier, lame, Mat3(Vec3(0.95, 1, 1).asDiagonal()))(0, 0) /
+                          first_piola_stress(plain, lame, Mat3(Vec3(0.95, 1, 1).asDiagonal()))(0, 0);
+    EXPECT_NEAR(slight, 1, 0.01);
+  }
 }
 
 TEST(Material, VonMisesOfKnownStatesIsTheirClosedForm) {

@@ -4,7 +4,7 @@
 #include <random>
 #include <set>
 
-#include "palpate/elastic/phases.h"
+#include "palpate/elastic/colored_batches.h"
 #include "palpate/elastic/tet_model.h"
 #include "tests/support/meshes.h"
 
@@ -66,24 +66,24 @@ TEST(TetAssembly, TheTangentOfManyElementsIsTheDerivativeOfTheirForces) {
     }
 }
 
-TEST(Phases, RangesOfOnePhaseHaveNoSlabInCommonAndEveryItemComesOnce) {
+TEST(ColoredBatches, RangesOfOnePhaseHaveNoSlabInCommonAndEveryItemComesOnce) {
   std::mt19937 random(3);
-  std::vector<int> least, most;
+  std::vector<int> min, max;
   for (int i = 0; i < 500; ++i) {
-    least.push_back(static_cast<int>(random() % 8));
-    most.push_back(std::min(7, least.back() + static_cast<int>(random() % 3)));
+    min.push_back(static_cast<int>(random() % 8));
+    max.push_back(std::min(7, min.back() + static_cast<int>(random() % 3)));
   }
-  const Phases phases = order_in_phases(least, most, 8);
-  EXPECT_EQ(std::set<int>(phases.order.begin(), phases.order.end()).size(), 500);
+  const ColoredBatches batches = color_batches(min, max, 8);
+  EXPECT_EQ(std::set<int>(batches.order.begin(), batches.order.end()).size(), 500);
   size_t covered = 0;
-  for (const auto& ranges : phases.phases) {
+  for (const auto& ranges : batches.batches) {
     std::set<int> taken;
-    for (const Phases::Range& range : ranges) {
+    for (const ColoredBatches::Range& range : ranges) {
       covered += static_cast<size_t>(range.end - range.begin);
       std::set<int> slabs;
       for (int i = range.begin; i < range.end; ++i) {
-        const auto item = static_cast<size_t>(phases.order[static_cast<size_t>(i)]);
-        for (int slab = least[item]; slab <= most[item]; ++slab) slabs.insert(slab);
+        const auto item = static_cast<size_t>(batches.order[static_cast<size_t>(i)]);
+        for (int slab = min[item]; slab <= max[item]; ++slab) slabs.insert(slab);
       }
       for (int slab : slabs) EXPECT_TRUE(taken.insert(slab).second) << slab;
     }

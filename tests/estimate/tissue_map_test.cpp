@@ -71,7 +71,7 @@ TEST_F(RenderedUterus, AScanThatLiesElsewhereIsRegistered) {
   const TissueMap map = build();
   ASSERT_TRUE(map.report.registration);
   EXPECT_LT(map.report.registration->residual_mm, 0.3);
-  EXPECT_GT(map.report.registration->matched_share, 0.95);
+  EXPECT_GT(map.report.registration->matched_fraction, 0.95);
   const Registration& found = *map.report.registration;
   const Mat3 turn = Eigen::AngleAxisd(0.25, Vec3(0.3, 0.8, 0.5).normalized()).toRotationMatrix();
   double largest = 0;

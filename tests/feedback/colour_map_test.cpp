@@ -74,8 +74,8 @@ TEST(StripChart, ShowsASmallForceThatBeginsAtNothingAtItsOwnScale) {
     each->add(0, 0.0);
     each->add(0.1, 0.02);
   }
-  EXPECT_DOUBLE_EQ(chart.most_N(), 0.1);
-  EXPECT_DOUBLE_EQ(per_modulus.most_N(), 0.05);
+  EXPECT_DOUBLE_EQ(chart.max_N(), 0.1);
+  EXPECT_DOUBLE_EQ(per_modulus.max_N(), 0.05);
 }
 
 TEST(StripChart, ForgetsWhatIsOlderThanItShows) {

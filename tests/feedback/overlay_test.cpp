@@ -69,9 +69,9 @@ cv::Mat painted(const ForceEstimate& estimate, const OverlayOptions& options = f
   return OverlayPainter(make_rectification(pinhole_rig(), kSize), tissue(), options).paint(tissue_image(), estimate);
 }
 
-/// What an opacity of 0.65 makes of the tissue under the colour of a share of the scale.
-void expect_blend(const cv::Vec3b& pixel, double share, double tolerance) {
-  const cv::Vec3b colour = colour_at(colour_table(ColourMap::viridis), share);
+/// What an opacity of 0.65 makes of the tissue under the colour of a fraction of the scale.
+void expect_blend(const cv::Vec3b& pixel, double fraction, double tolerance) {
+  const cv::Vec3b colour = colour_at(colour_table(ColourMap::viridis), fraction);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], 0.35 * kTissue[c] + 0.65 * colour[c], tolerance);
 }
 

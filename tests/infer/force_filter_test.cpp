@@ -74,7 +74,7 @@ class Made {
                         Vec3(noise(random_), noise(random_), noise(random_));
       frame.tissue.push_back(point);
     }
-    frame.tips.resize(kMostInstruments);
+    frame.tips.resize(kMaxInstruments);
     TipObservation& tip = frame.tips[0];
     tip.visible = tip_seen;
     tip.tip_mm = kPlace_mm + q_mm + scene_mm + 0.3 * Vec3(noise(random_), noise(random_), noise(random_));

@@ -23,13 +23,13 @@ struct Hit {
 };
 
 double radius_at(const DrawnInstrument& i, double back) {
-  const double share = std::clamp(back / i.jaw_mm, 0.0, 1.0);
-  return i.tip_radius_mm + share * (i.radius_mm - i.tip_radius_mm);
+  const double fraction = std::clamp(back / i.jaw_mm, 0.0, 1.0);
+  return i.tip_radius_mm + fraction * (i.radius_mm - i.tip_radius_mm);
 }
 
-/// Ray from (eye, 0, 0) through a pixel, by stepping with a bound on the distance to the surface.
-Hit cast(const DrawnInstrument& instrument, double eye_mm, double x, double y) {
-  const Vec3 origin(eye_mm, 0, 0);
+/// Ray from (camera, 0, 0) through a pixel, by stepping with a bound on the distance to the surface.
+Hit cast(const DrawnInstrument& instrument, double camera_mm, double x, double y) {
+  const Vec3 origin(camera_mm, 0, 0);
   const Vec3 ray = Vec3((x - kCenterX) / kFocal, (y - kCenterY) / kFocal, 1).normalized();
   // The ball ends at the tip, so that the tip is the far end of the drawn body.
   const Vec3 end = instrument.tip_mm - instrument.tip_radius_mm * instrument.direction;
@@ -67,10 +67,10 @@ Hit cast(const DrawnInstrument& instrument, double eye_mm, double x, double y) {
 }
 
 /// The nearest hit; how far all were missed when there is none.
-Hit cast(const std::vector<DrawnInstrument>& instruments, double eye_mm, double x, double y) {
+Hit cast(const std::vector<DrawnInstrument>& instruments, double camera_mm, double x, double y) {
   Hit nearest;
   for (const DrawnInstrument& instrument : instruments) {
-    const Hit hit = cast(instrument, eye_mm, x, y);
+    const Hit hit = cast(instrument, camera_mm, x, y);
     if (hit.hit ? hit.distance_mm < nearest.distance_mm : !nearest.hit && hit.missed_by_mm < nearest.missed_by_mm)
       nearest = hit;
   }
@@ -91,27 +91,29 @@ cv::Vec3d tissue_bgr(double x_mm, double y_mm) {
   return {48 * light, 52 * light, 135 * light};
 }
 
-cv::Mat draw_eye(const DrawnScene& scene, const std::vector<DrawnInstrument>& instruments, double eye_mm, int index) {
+cv::Mat draw_camera(const DrawnScene& scene, const std::vector<DrawnInstrument>& instruments, double camera_mm,
+                    int index) {
   cv::Mat image(kHeight, kWidth, CV_8UC3);
-  cv::RNG noise(scene.noise_seed * 1000 + static_cast<unsigned>(index) * 2 + (eye_mm > 0));
+  cv::RNG noise(scene.noise_seed * 1000 + static_cast<unsigned>(index) * 2 + (camera_mm > 0));
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       cv::Vec3d sum(0, 0, 0);
-      const Hit centre = cast(instruments, eye_mm, x, y);
+      const Hit centre = cast(instruments, camera_mm, x, y);
       const bool clear = !centre.hit && centre.missed_by_mm > 0.4;
       for (int sub = 0; sub < (clear ? 1 : 4); ++sub) {
         const double px = x + (clear ? 0 : (sub % 2) * 0.5 - 0.25), py = y + (clear ? 0 : (sub / 2) * 0.5 - 0.25);
-        const Hit hit = clear ? Hit() : cast(instruments, eye_mm, px, py);
+        const Hit hit = clear ? Hit() : cast(instruments, camera_mm, px, py);
         if (hit.hit)
           sum += cv::Vec3d::all(metal_grey(hit));
         else
-          sum += tissue_bgr((px - kCenterX) * kTissueDepth / kFocal + eye_mm, (py - kCenterY) * kTissueDepth / kFocal);
+          sum +=
+              tissue_bgr((px - kCenterX) * kTissueDepth / kFocal + camera_mm, (py - kCenterY) * kTissueDepth / kFocal);
       }
       for (int c = 0; c < 3; ++c)
         image.at<cv::Vec3b>(y, x)[c] = cv::saturate_cast<uchar>(sum[c] / (clear ? 1 : 4) + noise.gaussian(1.5));
     }
   if (scene.highlights) {
-    const double shift = scene.highlight_shift_px - kFocal * eye_mm / kTissueDepth;
+    const double shift = scene.highlight_shift_px - kFocal * camera_mm / kTissueDepth;
     for (const auto& [x, y, r] : {std::tuple{150, 120, 26}, {260, 250, 14}, {480, 90, 18}, {300, 60, 9}})
       cv::circle(image, cv::Point2d(x + shift, y), r, cv::Scalar(250, 250, 252), cv::FILLED, cv::LINE_AA);
   }
@@ -135,8 +137,8 @@ RectifiedPair draw_pair_of(const std::vector<DrawnInstrument>& instruments, cons
   RectifiedPair pair;
   pair.index = index;
   pair.time_s = 0.04 * index;
-  pair.left = draw_eye(scene, instruments, 0, index);
-  pair.right = draw_eye(scene, instruments, kBaseline, index);
+  pair.left = draw_camera(scene, instruments, 0, index);
+  pair.right = draw_camera(scene, instruments, kBaseline, index);
   return pair;
 }
 
@@ -144,10 +146,10 @@ RectifiedPair draw_pair(const DrawnScene& scene, const DrawnInstrument& instrume
   return draw_pair_of(scene.instrument ? std::vector{instrument} : std::vector<DrawnInstrument>{}, scene, index);
 }
 
-cv::Mat drawn_mask(const DrawnInstrument& instrument, double eye_mm) {
+cv::Mat drawn_mask(const DrawnInstrument& instrument, double camera_mm) {
   cv::Mat mask(kHeight, kWidth, CV_8U);
   for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) mask.at<uchar>(y, x) = cast(instrument, eye_mm, x, y).hit ? 255 : 0;
+    for (int x = 0; x < kWidth; ++x) mask.at<uchar>(y, x) = cast(instrument, camera_mm, x, y).hit ? 255 : 0;
   return mask;
 }
 

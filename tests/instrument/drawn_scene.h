@@ -31,7 +31,7 @@ RectifiedPair draw_pair(const DrawnScene& scene, const DrawnInstrument& instrume
 /// Several instruments, the nearer before the farther.
 RectifiedPair draw_pair_of(const std::vector<DrawnInstrument>& instruments, const DrawnScene& scene, int index);
 
-/// 255 where the left eye sees the instrument, by ray casting.
-cv::Mat drawn_mask(const DrawnInstrument& instrument, double eye_mm = 0);
+/// 255 where the left camera sees the instrument, by ray casting.
+cv::Mat drawn_mask(const DrawnInstrument& instrument, double camera_mm = 0);
 
 }  // namespace palpate::test

@@ -13,8 +13,8 @@ struct Kind {
   const char* name;
   test::Tissue tissue;
   Look look;
-  double least_overlap;  ///< intersection over union
-  double most_wrong_mm;
+  double min_overlap;  ///< intersection over union
+  double max_wrong_mm;
 };
 
 SimulatedInstrument instrument_of(const Kind& kind) {
@@ -41,11 +41,11 @@ TEST_P(Kinds, AreSegmentedAndFollowedAndTissueThatMovesIsNone) {
     const RectifiedPair pair = scene.draw({tip_mm}, frame);
     const cv::Mat truth = scene.truth_mask(0, 0), found = segment_instrument(pair.left, model);
     const double overlap = 1.0 * cv::countNonZero(found & truth) / std::max(1, cv::countNonZero(found | truth));
-    EXPECT_GT(overlap, kind.least_overlap) << "frame " << frame;
+    EXPECT_GT(overlap, kind.min_overlap) << "frame " << frame;
     const InstrumentObservations seen = tracker.update(pair);
     ASSERT_TRUE(seen.tips[0].visible) << "frame " << frame;
     EXPECT_FALSE(seen.tips[1].visible);
-    EXPECT_LT((seen.tips[0].tip_mm - tip_mm).norm(), kind.most_wrong_mm) << "frame " << frame;
+    EXPECT_LT((seen.tips[0].tip_mm - tip_mm).norm(), kind.max_wrong_mm) << "frame " << frame;
   }
 }
 

@@ -43,8 +43,8 @@ Texture tissue_of(Tissue kind, const SimulatedLook& look) {
     if (kind == Tissue::brown) texel.albedo = light * Colour(0.20f, 0.095f, 0.06f);
     if (kind == Tissue::tendon) {  // white bands, as straight as an instrument, and white patches
       const float band = step(5.0f, 4.4f, std::abs(p.y() + 0.25f * p.x() + 14 + 0.6f * patch));
-      const float share = std::max(band, step(0.28f, 0.33f, patch));
-      texel.albedo += share * (light * Colour(0.62f, 0.59f, 0.55f) - texel.albedo);
+      const float fraction = std::max(band, step(0.28f, 0.33f, patch));
+      texel.albedo += fraction * (light * Colour(0.62f, 0.59f, 0.55f) - texel.albedo);
     }
     return texel;
   };
@@ -111,8 +111,8 @@ RectifiedPair RenderedScene::draw(const std::vector<Vec3>& tips_mm, int index, c
   return {index, index / camera_.fps, frame.left, frame.right};
 }
 
-cv::Mat RenderedScene::truth_mask(size_t instrument, int eye) {
-  return renderer_.visible_mask(numbers_.at(instrument), eye);
+cv::Mat RenderedScene::truth_mask(size_t instrument, int camera) {
+  return renderer_.visible_mask(numbers_.at(instrument), camera);
 }
 
 Rectification RenderedScene::rectification() const {

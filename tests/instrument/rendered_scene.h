@@ -20,8 +20,8 @@ class RenderedScene {
   /// `tissue_mm`: by which the tissue has moved. `blur_mm`: way of the instruments while the shutter is open.
   RectifiedPair draw(const std::vector<Vec3>& tips_mm, int index, const Vec3& tissue_mm = Vec3::Zero(),
                      const Vec3& blur_mm = Vec3::Zero());
-  /// 255 where an eye saw the instrument in the middle of the last draw.
-  cv::Mat truth_mask(size_t instrument, int eye);
+  /// 255 where an camera saw the instrument in the middle of the last draw.
+  cv::Mat truth_mask(size_t instrument, int camera);
 
   Rectification rectification() const;
 

@@ -38,7 +38,7 @@ TEST(TwoInstruments, HaveEntriesOfTheirOwnInTheOrderInWhichTheyCame) {
     std::vector<test::DrawnInstrument> drawn = {first};
     if (frame > 3) drawn.push_back(second);
     const auto seen = tracker.update(test::draw_pair_of(drawn, {}, frame)).tips;
-    ASSERT_EQ(seen.size(), kMostInstruments);
+    ASSERT_EQ(seen.size(), kMaxInstruments);
     EXPECT_TRUE(seen[0].visible) << "frame " << frame;
     expect_near(seen[0], first, frame, "first");
     expect_near(seen[1], second, frame, "second");
@@ -95,8 +95,8 @@ TEST(TwoInstruments, GiveNoWrongTipWhereTheyCross) {
   int visible = 0, touching = 0;
   for (int frame = 1; frame < 24; ++frame) {
     // The left one moves on until its tip has gone past the right one's shaft, in front of it, and back.
-    const double share = 0.5 - 0.5 * std::cos(2 * CV_PI * frame / 24);
-    const auto left = moved(kFromTheLeft, share * Vec3(33, -5, -10));
+    const double fraction = 0.5 - 0.5 * std::cos(2 * CV_PI * frame / 24);
+    const auto left = moved(kFromTheLeft, fraction * Vec3(33, -5, -10));
     const auto seen = tracker.update(test::draw_pair_of(std::vector{kFromTheRight, left}, {}, frame)).tips;
     expect_near(seen[0], kFromTheRight, frame, "first");
     expect_near(seen[1], left, frame, "second");

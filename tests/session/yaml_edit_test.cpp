@@ -11,7 +11,7 @@ namespace {
 const std::string kScene =
     "# Überschrift: the uterus\n"
     "recording:   # two files\n"
-    "  left: left.mp4   # left eye\n"
+    "  left: left.mp4   # left camera\n"
     "  right: right.mp4\n"
     "map: {frame: 0, elements: 550,  # n of Eq. 1\n"
     "      organ_region_px: [[1, 2], [3, 4], [5, 6]]}\n"

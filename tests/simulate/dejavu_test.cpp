@@ -104,7 +104,7 @@ TEST_F(DejaVu, CalibrationIsReadBackByTheRigReader) {
   const StereoRig rig = read_rig(folder / "calibration.yaml");
   EXPECT_EQ(rig.image_size, cv::Size(240, 136));
   EXPECT_NEAR(rig.baseline_mm(), 5, 1e-12);
-  EXPECT_LT(rig.right_from_left_mm.x(), 0);  // the right eye is on the right
+  EXPECT_LT(rig.right_from_left_mm.x(), 0);  // the right camera is on the right
   EXPECT_NEAR(rig.left.K(0, 0), 175, 1e-12);
   EXPECT_NEAR(rig.right.K(1, 2), 67.5, 1e-12);
   EXPECT_NO_THROW(check_rig_fits(rig, cv::Size(240, 136)));

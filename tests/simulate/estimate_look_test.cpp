@@ -42,7 +42,7 @@ cv::Mat picture(const SimulatedLook& look, const Texture& texture) {
   return renderer.render(0).left;
 }
 
-// Albedo of the texture where the left eye sees it, linear BGR; black elsewhere.
+// Albedo of the texture where the left camera sees it, linear BGR; black elsewhere.
 cv::Mat true_albedo(const Texture& texture) {
   const Surface surface = organ();
   RayScene rays;

@@ -40,9 +40,9 @@ TEST(Smoke, HangsInSpaceSoThatBothEyesSeeTheSameWisps) {
   look.smoke = {1.0, 1.0};
   const double depth_mm = 100;
   const cv::Mat depth(96, 160, CV_32F, cv::Scalar(depth_mm));
-  const auto smoke_seen = [&](double eye_x_mm, double time_s) {
+  const auto smoke_seen = [&](double camera_x_mm, double time_s) {
     cv::Mat light(96, 160, CV_32FC3, cv::Scalar::all(0));
-    add_smoke(light, depth, camera, look, {eye_x_mm, 0, 0}, time_s);
+    add_smoke(light, depth, camera, look, {camera_x_mm, 0, 0}, time_s);
     return light;
   };
   // Wisps hang at 0.6 of the depth: 48 mm aside they are seen 48 * 200 / 60 = 160 px aside, 12 mm 40 px.

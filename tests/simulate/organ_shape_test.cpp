@@ -41,13 +41,13 @@ TEST_P(OrganShape, IsClosedOutwardAndOfTheStatedSize) {
   EXPECT_TRUE(is_closed(organ));
   EXPECT_GT(enclosed_volume_mm3(organ), 0.35 * 60 * 40 * 30);
   EXPECT_LT(enclosed_volume_mm3(organ), 60 * 40 * 30);
-  Vec3 least = organ.vertices_mm[0], most = least;
+  Vec3 min = organ.vertices_mm[0], max = min;
   for (const Vec3& vertex : organ.vertices_mm) {
-    least = least.cwiseMin(vertex);
-    most = most.cwiseMax(vertex);
+    min = min.cwiseMin(vertex);
+    max = max.cwiseMax(vertex);
   }
-  EXPECT_NEAR((most - least - body.size_mm).norm(), 0, 1e-9);
-  EXPECT_NEAR(((most + least) / 2 - body.center_mm).norm(), 0, 1e-9);
+  EXPECT_NEAR((max - min - body.size_mm).norm(), 0, 1e-9);
+  EXPECT_NEAR(((max + min) / 2 - body.center_mm).norm(), 0, 1e-9);
 }
 
 TEST_P(OrganShape, KeepsItsVolumeWhenTurned) {

@@ -54,10 +54,10 @@ TEST_F(PushedSlab, SticksWithinTheConeAndSlidesOnItsEdge) {
     EXPECT_LE(answer.equilibrium.residual, 1e-8);
     const Vec3 force_N = along_axes(answer.equilibrium.force_N);
     EXPECT_LT(force_N[0], 0);  // pushes
-    const double share = force_N.tail<2>().norm() / (-friction * force_N[0]);
-    EXPECT_LT(share, 1.02);  // the slab's surface is flat only as its triangles are
+    const double fraction = force_N.tail<2>().norm() / (-friction * force_N[0]);
+    EXPECT_LT(fraction, 1.02);  // the slab's surface is flat only as its triangles are
     if (answer.slid) {
-      EXPECT_NEAR(share, 1, 0.02) << "at " << a;
+      EXPECT_NEAR(fraction, 1, 0.02) << "at " << a;
     }
     stuck = stuck || (a > 0 && !answer.slid);
     slid = slid || answer.slid;

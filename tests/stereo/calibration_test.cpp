@@ -284,8 +284,8 @@ std::string camera_info(const std::string& D, const std::string& K, const std::s
     for (const double number : numbers) text += fmt::format("- {}\n", number);
     return text;
   };
-  return "header:\n  frame_id: eye\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n" + D + ":" + value(kD1) + K +
-         ":" + value(kK1) + R + ":" + value({1, 0, 0, 0, 1, 0, 0, 0, 1}) + P + ":" +
+  return "header:\n  frame_id: camera\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n" + D + ":" + value(kD1) +
+         K + ":" + value(kK1) + R + ":" + value({1, 0, 0, 0, 1, 0, 0, 0, 1}) + P + ":" +
          value({700, 0, 320, shift, 0, 700, 240, 0, 0, 0, 1, 0}) + "binning_x: 0\nroi:\n  height: 0\n  width: 0\n---\n";
 }
 

@@ -20,8 +20,8 @@ using testing::IsEmpty;
 
 struct Loss {
   double median_px;     // may grow by
-  double above_one_px;  // share of errors above one pixel may grow by
-  double covered;       // share of measured pixels may fall by
+  double above_one_px;  // fraction of errors above one pixel may grow by
+  double covered;       // fraction of measured pixels may fall by
 };
 
 DisparityMap match_case(const TruthCase& c, const cv::Mat& mask = {}) {
@@ -109,8 +109,8 @@ TEST_P(Degraded, TheBlackBorderOfTheScopeIsLeftOut) {
   c.pair.right.setTo(cv::Scalar::all(3), ~inside);
   const DisparityMap map = match_case(c);
   EXPECT_EQ(cv::countNonZero((map.disparity_px == map.disparity_px) & ~inside), 0);
-  const double most_px = 90;
-  cv::warpAffine(inside, seen_by_both, cv::Matx23d(1, 0, most_px, 0, 1, 0), size, cv::INTER_NEAREST);
+  const double max_px = 90;
+  cv::warpAffine(inside, seen_by_both, cv::Matx23d(1, 0, max_px, 0, 1, 0), size, cv::INTER_NEAREST);
   c.scored &= inside & seen_by_both;
   clean.scored = c.scored;
   expect_loss_below(map, c, clean, {0.01, 0.01, 0.03});

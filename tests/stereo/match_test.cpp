@@ -96,7 +96,7 @@ struct Errors {
   double within_one_deviation = 0;
 };
 
-// Over what both eyes see.
+// Over what both cameras see.
 Errors errors_of(const DisparityMap& map) {
   Errors errors;
   int seen = 0, found = 0, within = 0;

@@ -24,7 +24,7 @@ std::filesystem::path make_network(const TemporaryFolder& folder, const std::str
   return std::system(command.c_str()) == 0 ? file : std::filesystem::path();
 }
 
-// Random texture; the right eye sees it `shift` px further left.
+// Random texture; the right camera sees it `shift` px further left.
 struct Pair {
   cv::Mat left = cv::Mat(96, 160, CV_8UC3), right;
   explicit Pair(int shift) {

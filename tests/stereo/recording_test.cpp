@@ -20,7 +20,7 @@ using namespace std::string_literals;
 
 constexpr int kLeftLevel = 60, kRightLevel = 180;
 
-// A grey image whose level tells the eye and whose bright bar tells the frame.
+// A grey image whose level tells the camera and whose bright bar tells the frame.
 cv::Mat picture(cv::Size size, int level, int frame) {
   cv::Mat image(size, CV_8UC3, cv::Scalar::all(level));
   image(cv::Rect(0, 4 * (frame % 10), size.width, 4)) = cv::Scalar::all(250);
@@ -33,13 +33,13 @@ void write_video(const std::filesystem::path& file, const std::vector<cv::Mat>& 
   for (const cv::Mat& image : images) writer.write(image);
 }
 
-std::vector<cv::Mat> eye(int level, int frames, cv::Size size = {64, 48}) {
+std::vector<cv::Mat> camera(int level, int frames, cv::Size size = {64, 48}) {
   std::vector<cv::Mat> images;
   for (int i = 0; i < frames; ++i) images.push_back(picture(size, level, i));
   return images;
 }
 
-std::vector<cv::Mat> both_eyes(int frames, StereoLayout layout) {
+std::vector<cv::Mat> both_cameras(int frames, StereoLayout layout) {
   std::vector<cv::Mat> images;
   for (int i = 0; i < frames; ++i) {
     cv::Mat both;
@@ -54,7 +54,7 @@ int level_of(const cv::Mat& image) {
   return image.at<cv::Vec3b>(image.rows - 2, image.cols / 2)[0];
 }
 
-void expect_eyes(const StereoFrame& frame, int left, int right, int index) {
+void expect_cameras(const StereoFrame& frame, int left, int right, int index) {
   EXPECT_EQ(frame.left.size(), cv::Size(64, 48));
   EXPECT_EQ(frame.right.size(), cv::Size(64, 48));
   EXPECT_NEAR(level_of(frame.left), left, 6);
@@ -70,7 +70,7 @@ void expect_all(const RecordingOptions& options, int frames, int left = kLeftLev
   for (int i = 0; i < frames; ++i) {
     const auto frame = recording.next();
     ASSERT_TRUE(frame.has_value());
-    expect_eyes(*frame, left, right, i);
+    expect_cameras(*frame, left, right, i);
     EXPECT_NEAR(frame->time_s, i / recording.fps(), 1e-9);
   }
   EXPECT_FALSE(recording.next().has_value());
@@ -78,8 +78,8 @@ void expect_all(const RecordingOptions& options, int frames, int left = kLeftLev
 
 TEST(Recording, ReadsTwoVideos) {
   const TemporaryFolder folder;
-  write_video(folder / "left.avi", eye(kLeftLevel, 5));
-  write_video(folder / "right.avi", eye(kRightLevel, 5));
+  write_video(folder / "left.avi", camera(kLeftLevel, 5));
+  write_video(folder / "right.avi", camera(kRightLevel, 5));
   RecordingOptions options;
   options.left = folder / "left.avi";
   options.right = folder / "right.avi";
@@ -97,7 +97,7 @@ TEST(Recording, SplitsSideBySideAndTopBottom) {
     RecordingOptions options;
     options.stereo = folder / "both.avi";
     options.layout = layout;
-    write_video(options.stereo, both_eyes(4, layout));
+    write_video(options.stereo, both_cameras(4, layout));
     expect_all(options, 4);
     options.swap = true;
     expect_all(options, 4, kRightLevel, kLeftLevel);
@@ -208,7 +208,7 @@ TEST(Recording, OpensNamesWithAPercentSign) {
   EXPECT_EQ(pairs_and_times(options).first, "1");
   options.left = folder / "20%_left.avi";
   options.right = folder / "20%_right.avi";
-  for (const auto& path : {options.left, options.right}) write_video(path, eye(kLeftLevel, 2));
+  for (const auto& path : {options.left, options.right}) write_video(path, camera(kLeftLevel, 2));
   EXPECT_EQ(pairs_and_times(options).first, "11");
 }
 
@@ -230,8 +230,8 @@ class MadeByFfmpeg : public ::testing::Test {
  protected:
   void SetUp() override {
     if (std::system("ffmpeg -version >/dev/null 2>&1") != 0) GTEST_SKIP() << "the program ffmpeg is not installed";
-    write_video(folder_ / "left.avi", eye(kLeftLevel, 10));
-    write_video(folder_ / "right.avi", eye(kRightLevel, 10));
+    write_video(folder_ / "left.avi", camera(kLeftLevel, 10));
+    write_video(folder_ / "right.avi", camera(kRightLevel, 10));
   }
   void make(const std::string& from, const std::string& options, const std::string& to,
             const std::string& of_input = "") const {
@@ -296,7 +296,7 @@ TEST(Recording, ReadsAPairOfSingleImages) {
 
 TEST(Recording, SaysWhatIsMissingEmptyOrNoVideo) {
   const TemporaryFolder folder;
-  write_video(folder / "left.avi", eye(kLeftLevel, 3));
+  write_video(folder / "left.avi", camera(kLeftLevel, 3));
   RecordingOptions options;
   options.left = folder / "left.avi";
   const auto sentence = [&](const std::string& name) {
@@ -327,13 +327,13 @@ TEST(Recording, RefusesImagesWhoseNumbersDoNotTellTheMoment) {
 
 TEST(Recording, SaysHowLeftAndRightDiffer) {
   const TemporaryFolder folder;
-  write_video(folder / "left.avi", eye(kLeftLevel, 5));
+  write_video(folder / "left.avi", camera(kLeftLevel, 5));
   RecordingOptions options;
   options.left = folder / "left.avi";
   options.right = folder / "right.avi";
-  write_video(options.right, eye(kRightLevel, 4));
+  write_video(options.right, camera(kRightLevel, 4));
   EXPECT_EQ(pairs_and_times(options).first, "11110");
-  write_video(options.right, eye(kRightLevel, 5, {80, 48}));
+  write_video(options.right, camera(kRightLevel, 5, {80, 48}));
   EXPECT_THAT(sentence_of([&] { Recording recording(options); }), AllOf(HasSubstr("64x48"), HasSubstr("80x48")));
 }
 
@@ -361,7 +361,7 @@ TEST(Recording, EndsUnfinishedWhenTheVideoIsTruncated) {
   const TemporaryFolder folder;
   RecordingOptions options;
   options.stereo = folder / "both.avi";
-  write_video(options.stereo, both_eyes(60, StereoLayout::side_by_side));
+  write_video(options.stereo, both_cameras(60, StereoLayout::side_by_side));
   std::filesystem::resize_file(options.stereo, std::filesystem::file_size(options.stereo) * 3 / 4);
   Recording recording(options);
   ASSERT_EQ(recording.frame_count(), 60);
@@ -382,7 +382,7 @@ TEST(Recording, EndsUnfinishedWhenTheVideoShrinksWhileItIsRead) {
   const TemporaryFolder folder;
   RecordingOptions options;
   options.stereo = folder / "both.avi";
-  write_video(options.stereo, both_eyes(120, StereoLayout::side_by_side));
+  write_video(options.stereo, both_cameras(120, StereoLayout::side_by_side));
   Recording recording(options);
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(recording.next());
   std::filesystem::resize_file(options.stereo, std::filesystem::file_size(options.stereo) / 2);

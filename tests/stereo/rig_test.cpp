@@ -36,7 +36,7 @@ std::string calibration(const std::string& camera = "M", const std::string& rota
 
 std::string camera_info(double shift, const std::string& model = "plumb_bob") {
   return fmt::format(
-      "image_width: 640\nimage_height: 480\ncamera_name: eye\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [{}]\n"
+      "image_width: 640\nimage_height: 480\ncamera_name: camera\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [{}]\n"
       "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0.1, 0, 0, 0, 0]\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [{}]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [700, 0, 320, {}, 0, 700, 240, 0, 0, 0, 1, 0]\n",
@@ -145,7 +145,7 @@ TEST(DescribeRig, NamesBaselineFocalLengthAndFieldOfView) {
   EXPECT_EQ(describe_rig(rig, {1280, 1024}), "baseline 4.14 mm, focal 1035 px, field of view 63 x 53 degrees");
 }
 
-// Eyes that differ in everything, turned against each other, with strong distortion.
+// Cameras that differ in everything, turned against each other, with strong distortion.
 StereoRig awkward_rig() {
   StereoRig rig;
   rig.left.K = {705, 0, 330, 0, 698, 232, 0, 0, 1};

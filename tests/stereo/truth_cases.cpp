@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 #include "palpate/stereo/recording.h"
 #include "tests/support/reference_data.h"
 
@@ -72,7 +73,7 @@ TruthCase read_structured_light(const std::filesystem::path& folder) {
   return result;
 }
 
-// The eyes of this rig have principal points 32.778 px apart, so disparity 0 is not infinitely far.
+// The cameras of this rig have principal points 32.778 px apart, so disparity 0 is not infinitely far.
 TruthCase read_motorcycle(const std::filesystem::path& folder) {
   constexpr double focal_px = 999.421, baseline_mm = 193.001;
   TruthCase result;
@@ -87,13 +88,6 @@ TruthCase read_motorcycle(const std::filesystem::path& folder) {
   result.shift_px = 32.778;
   result.metric = true;
   return result;
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double mean_of(const std::vector<double>& values) {

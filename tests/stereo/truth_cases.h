@@ -15,7 +15,7 @@ struct TruthCase {
   Rectification rectification;
   MatchOptions options;  ///< depths searched
   cv::Mat truth_px;      ///< CV_32F
-  cv::Mat scored;        ///< 8-bit, 255 where the truth is valid and both eyes see it, as far as the case says so
+  cv::Mat scored;        ///< 8-bit, 255 where the truth is valid and both cameras see it, as far as the case says so
   double truth_deviation_px = 0;  ///< one standard deviation of the truth itself, by how it scatters about planes
   double shift_px = 0;            ///< depth = focal * baseline / (disparity + shift)
   bool metric = false;            ///< the calibration is known, so errors can be told in mm
@@ -31,9 +31,9 @@ TruthCase read_truth_case(const std::string& name);
 struct MatchScore {
   double mean_px = 0, median_px = 0;
   double mean_mm = 0, median_mm = 0;
-  double above_one_px = 0;            ///< share of the measured pixels
-  double covered = 0;                 ///< share of the scored pixels that are measured
-  double within_one_deviation = 0;    ///< share of the measured pixels whose error the stated deviation explains ...
+  double above_one_px = 0;            ///< fraction of the measured pixels
+  double covered = 0;                 ///< fraction of the scored pixels that are measured
+  double within_one_deviation = 0;    ///< fraction of the measured pixels whose error the stated deviation explains ...
   double within_both_deviations = 0;  ///< ... or that and the deviation of the truth
 };
 

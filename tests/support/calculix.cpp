@@ -54,6 +54,7 @@ std::string material_of(const TissueOptions& tissue) {
       return fmt::format("*ELASTIC\n{},{}\n", number(tissue.young_modulus_MPa()), number(tissue.poisson_ratio));
     case Law::neo_hookean:
       return fmt::format("*HYPERELASTIC,NEO HOOKE\n{},{}\n", number(lame.mu / 2), number(2 / bulk_modulus(lame)));
+    case Law::saint_venant_kirchhoff_barrier:
     case Law::corotated:
       break;
   }

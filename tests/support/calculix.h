@@ -44,7 +44,7 @@ QuadraticMesh with_midside_nodes(const TetMesh& mesh);
 /// What is imposed on both ends of an edge is imposed on its middle, their mean.
 Imposed with_midside_nodes(const QuadraticMesh& mesh, const Imposed& imposed_mm);
 
-/// The same with quadratic elements; its `u` and `reaction` cover the midside nodes too. `first_step`: share of the
+/// The same with quadratic elements; its `u` and `reaction` cover the midside nodes too. `first_step`: fraction of the
 /// load that the first increment takes.
 CalculixAnswer run_calculix(const QuadraticMesh& mesh, const TissueOptions& tissue, const Imposed& imposed_mm,
                             double first_step = 0.1);

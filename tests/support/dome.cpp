@@ -98,8 +98,8 @@ TetMesh quarter_dome(const Dome& dome, double radius_mm, int sectors) {
   const auto place = [&](const Rings::Point& p) {
     const Eigen::Vector2d direction(std::cos(p.angle), std::sin(p.angle));
     const double to_rim = 1 / std::hypot(direction[0] / dome.half_length_mm, direction[1] / dome.half_width_mm);
-    const double share = 1 - static_cast<double>(p.ring) / sectors;
-    if (share >= 0) return Eigen::Vector2d(radius_mm * (1 - std::pow(share, 1.5)) * direction);
+    const double fraction = 1 - static_cast<double>(p.ring) / sectors;
+    if (fraction >= 0) return Eigen::Vector2d(radius_mm * (1 - std::pow(fraction, 1.5)) * direction);
     const double t = outside[static_cast<size_t>(p.ring - sectors)];
     return Eigen::Vector2d((radius_mm + t * (to_rim - radius_mm)) * direction);
   };

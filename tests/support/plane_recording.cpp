@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kWidth = 320, kHeight = 240;
 
-/// Disparity of the plane where the *right* eye sees it.
+/// Disparity of the plane where the *right* camera sees it.
 double disparity_at(double x, double y) {
   return 22 + 0.006 * x + 0.012 * y;
 }

@@ -18,7 +18,7 @@ class Workspace {
   std::filesystem::path folder_;
 };
 
-/// A textured plane that leans away from a rectified pair of eyes: 320 x 240, focal 300 px, baseline 5 mm.
+/// A textured plane that leans away from a rectified pair of cameras: 320 x 240, focal 300 px, baseline 5 mm.
 struct PlanePair {
   cv::Mat left, right;
 };

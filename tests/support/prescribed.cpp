@@ -8,7 +8,7 @@ namespace palpate::test {
 
 namespace {
 
-constexpr int kMostIterations = 40, kMostHalvings = 30;
+constexpr int kMaxIterations = 40, kMaxHalvings = 30;
 constexpr double kTolerance = 1e-10;
 
 class Newton {
@@ -34,7 +34,7 @@ class Newton {
     const Eigen::VectorXd force = model_.reduce(model_.internal_force(u)), du = direction(u, force);
     const double before = model_.energy(u), residual = force.norm();
     double length = 1;
-    for (int halving = 0; halving < kMostHalvings; ++halving, length *= 0.5) {
+    for (int halving = 0; halving < kMaxHalvings; ++halving, length *= 0.5) {
       const Eigen::VectorXd next = u + length * du;
       const double after = model_.energy(next);
       if (!std::isfinite(after)) continue;
@@ -70,7 +70,7 @@ PrescribedEquilibrium solve_prescribed(const TetModel& model, const std::map<int
   for (int step = 1; step <= steps; ++step) {
     newton.predict(found.u, end / steps);
     found.converged = false;
-    for (int i = 0; i < kMostIterations; ++i, ++found.iterations) {
+    for (int i = 0; i < kMaxIterations; ++i, ++found.iterations) {
       found.force = model.internal_force(found.u);
       const double unbalanced = model.reduce(found.force).lpNorm<Eigen::Infinity>();
       found.converged = unbalanced <= kTolerance * found.force.lpNorm<Eigen::Infinity>();

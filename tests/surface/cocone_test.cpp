@@ -17,7 +17,7 @@ struct Case {
   TrueSurface truth;
   View view;
   double spacing_mm;
-  double most_rms_mm;
+  double max_rms_mm;
   int loops = 1;
 };
 
@@ -35,8 +35,8 @@ TEST_P(VisibleSurface, IsManifoldOnePieceTowardsTheCameraAndNearTheTruth) {
   const Surface surface = cocone(clean.position_mm, {});
   EXPECT_EQ(topology_fault(surface), "");
   EXPECT_EQ(boundary_loops(surface), given.loops);
-  EXPECT_LT(share_facing_away(surface), 0.002);
-  EXPECT_LT(rms_distance_mm(given.truth, surface.vertices_mm), given.most_rms_mm);
+  EXPECT_LT(fraction_facing_away(surface), 0.002);
+  EXPECT_LT(rms_distance_mm(given.truth, surface.vertices_mm), given.max_rms_mm);
   EXPECT_GT(surface.vertices_mm.size(), 0.95 * static_cast<double>(clean.size()));
 }
 

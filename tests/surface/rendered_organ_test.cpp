@@ -42,7 +42,7 @@ TEST_P(RenderedOrgan, SurfaceFollowsTheTrueDepthUnderNoiseAndOutliers) {
   const Surface surface = cocone(clean_points(cloud, 2, {}).position_mm, {});
   EXPECT_EQ(topology_fault(surface), "");
   EXPECT_EQ(boundary_loops(surface), 1);
-  EXPECT_LT(share_facing_away(surface), 0.002);
+  EXPECT_LT(fraction_facing_away(surface), 0.002);
   double sum = 0;
   int count = 0;
   for (const Vec3& v : surface.vertices_mm) {

@@ -147,7 +147,7 @@ int boundary_loops(const Surface& surface) {
   return loops;
 }
 
-double share_facing_away(const Surface& surface) {
+double fraction_facing_away(const Surface& surface) {
   int away = 0;
   for (const Triangle& t : surface.triangles) {
     const Vec3 &a = surface.vertices_mm[static_cast<size_t>(t[0])], &b = surface.vertices_mm[static_cast<size_t>(t[1])],

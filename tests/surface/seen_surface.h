@@ -49,6 +49,6 @@ std::string topology_fault(const Surface& surface);
 int boundary_loops(const Surface& surface);
 
 /// Share of triangles whose normal looks away from the camera.
-double share_facing_away(const Surface& surface);
+double fraction_facing_away(const Surface& surface);
 
 }  // namespace palpate::test

@@ -58,7 +58,7 @@ TEST(RegisterBody, FindsAKnownMotionFromEqualMiddles) {
     EXPECT_LT(largest_error_mm(truth, given, found), 0.3) << "turned by " << angle;
     // 0.2 mm along the ray, less across the surface.
     EXPECT_NEAR(found.residual_mm, 0.14, 0.05);
-    EXPECT_GT(found.matched_share, 0.98);
+    EXPECT_GT(found.matched_fraction, 0.98);
     EXPECT_TRUE((found.left_from_volume * found.left_from_volume.transpose()).isIdentity(1e-9));
   }
 }
@@ -79,7 +79,7 @@ TEST(RegisterBody, IsNotPulledByPointsThatAreNotOnTheBody) {
   const Surface given = moved(truth, motion({0, 1, 0}, 0.15, {5, 3, -8}));
   const Registration found = register_body(given, seen);
   EXPECT_LT(largest_error_mm(truth, given, found), 0.3);
-  EXPECT_LT(found.matched_share, 0.95);
+  EXPECT_LT(found.matched_fraction, 0.95);
 }
 
 TEST(RegisterBody, AnotherShapeLeavesAResidual) {

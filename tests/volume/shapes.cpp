@@ -86,9 +86,9 @@ double total_volume_mm3(const TetMesh& mesh) {
 }
 
 double smallest_volume_mm3(const TetMesh& mesh) {
-  double least = 1e300;
-  for (const Tetrahedron& t : mesh.tetrahedra) least = std::min(least, volume(mesh, t));
-  return least;
+  double min = 1e300;
+  for (const Tetrahedron& t : mesh.tetrahedra) min = std::min(min, volume(mesh, t));
+  return min;
 }
 
 std::string boundary_fault(const TetMesh& mesh) {

@@ -25,7 +25,7 @@ struct Case {
   Surface body;
   int elements;
   double volume_tolerance;
-  double most_rms_mm;  ///< of the body's vertices to the boundary of the mesh
+  double max_rms_mm;  ///< of the body's vertices to the boundary of the mesh
 };
 
 void PrintTo(const Case& given, std::ostream* stream) {
@@ -51,7 +51,7 @@ TEST_P(Filled, HasTheCountPositiveElementsGoodAnglesAndTheVolume) {
   const TetMesh mesh = tetrahedralize(given.body, given.elements, {}, &report);
   expect_good_mesh(given.body, mesh, report, given.elements);
   EXPECT_NEAR(total_volume_mm3(mesh) / enclosed_volume_mm3(given.body), 1, given.volume_tolerance);
-  EXPECT_LT(rms_distance_mm(given.body.vertices_mm, mesh), given.most_rms_mm);
+  EXPECT_LT(rms_distance_mm(given.body.vertices_mm, mesh), given.max_rms_mm);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, Filled,

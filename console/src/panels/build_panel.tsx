@@ -6,7 +6,7 @@ import {Lazy3d} from '../parts/lazy3d';
 import {Said} from '../parts/said';
 
 const kStages: [string, string][] = [
-  ['read', 'opened and read'], ['rectify', 'both eyes rectified'], ['match', 'points matched'],
+  ['read', 'opened and read'], ['rectify', 'both cameras rectified'], ['match', 'points matched'],
   ['triangulate', 'points in space'], ['edges', 'edges of depth found'], ['surface', 'surface laid'],
   ['register', 'scan registered'], ['volume', 'body filled'], ['attachments', 'attachments set'],
 ];

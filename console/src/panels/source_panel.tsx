@@ -23,7 +23,7 @@ interface Choice {
 }
 const kNothing: Choice = {left: '', right: '', stereo: '', calibration: ''};
 
-/** Both eyes and the calibration, where their names tell. */
+/** Both cameras and the calibration, where their names tell. */
 function guess(files: FileEntry[]): Choice {
   const video = (part: string) => files.find((f) => f.kind === 'video' && f.name.toLowerCase().includes(part))?.file ?? '';
   const calibration = files.find((f) => ['yaml', 'calibration'].includes(f.kind) && /calib|camera|stereo|left/i.test(f.name));
@@ -134,7 +134,7 @@ function LiveForm({mayOpen, isBusy, calibration, selectCalibration, open}: LiveF
   );
 }
 
-/** Rows that must meet the same points in both eyes; they can be dragged. */
+/** Rows that must meet the same points in both cameras; they can be dragged. */
 function RowLines({count}: {count: number}) {
   const [rows, setRows] = useState(() => Array.from({length: count}, (_, i) => (i + 1) / (count + 1)));
   const drag = (index: number) => (event: PointerEvent) => {
@@ -217,7 +217,7 @@ export function SourcePanel() {
         <section class="welcome">
           <h2>From a recording to a force</h2>
           <ol>
-            <li>Open a recording of both eyes with its calibration, or a scene.</li>
+            <li>Open a recording of both cameras with its calibration, or a scene.</li>
             <li>Draw the organ, say where it is held and what it is made of.</li>
             <li>Build the map from a frame in which the tissue is at rest.</li>
             <li>Run, and watch the force.</li>

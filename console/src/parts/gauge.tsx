@@ -7,8 +7,8 @@ function scaleFor(peak: number): number {
   return kScales_N.find((scale) => peak <= scale) ?? Math.pow(10, Math.ceil(Math.log10(peak)));
 }
 
-function onArc(share: number, radius: number): [number, number] {
-  const angle = ((kStart + kSweep * Math.min(1, Math.max(0, share))) * Math.PI) / 180;
+function onArc(fraction: number, radius: number): [number, number] {
+  const angle = ((kStart + kSweep * Math.min(1, Math.max(0, fraction))) * Math.PI) / 180;
   return [100 + radius * Math.cos(angle), 100 + radius * Math.sin(angle)];
 }
 
@@ -59,11 +59,11 @@ export function Gauge({row, peak_N, unit, tissue}: Props) {
         <path class="track" d={arc(0, 1, 82)} />
         {isKnown && row.high_N > row.low_N && <path class="band" d={arc(row.low_N / scale, row.high_N / scale, 82)} />}
         {isKnown && force > 0 && <path class="value" d={arc(0, force / scale, 68)} />}
-        {[0, 0.5, 1].map((share) => {
-          const [x, y] = onArc(share, 97);
+        {[0, 0.5, 1].map((fraction) => {
+          const [x, y] = onArc(fraction, 97);
           return (
-            <text key={share} x={x} y={y + 3} class="tick">
-              {share * scale}
+            <text key={fraction} x={x} y={y + 3} class="tick">
+              {fraction * scale}
             </text>
           );
         })}

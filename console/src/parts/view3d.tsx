@@ -19,18 +19,18 @@ const kFixed = new THREE.Color('#e0872e'), kNotSeen = new THREE.Color('#5b6b86')
 // Viridis at five places, as the overlay has it.
 const kViridis = ['#440154', '#3b528b', '#21918c', '#5ec962', '#fde725'].map((hex) => new THREE.Color(hex));
 
-function viridis(share: number): THREE.Color {
-  const at = Math.min(1, Math.max(0, share)) * (kViridis.length - 1), below = Math.min(Math.floor(at), kViridis.length - 2);
+function viridis(fraction: number): THREE.Color {
+  const at = Math.min(1, Math.max(0, fraction)) * (kViridis.length - 1), below = Math.min(Math.floor(at), kViridis.length - 2);
   return kViridis[below]!.clone().lerp(kViridis[below + 1]!, at - below);
 }
 
 /** Stress as in the overlay: none leaves the tissue as it is. */
-function coloursOf(shape: Shape, colouring: Colouring, most_kPa: number): Float32Array {
+function coloursOf(shape: Shape, colouring: Colouring, max_kPa: number): Float32Array {
   const colours = new Float32Array(shape.positions_mm.length);
   for (let i = 0; i < shape.flags.length; ++i) {
     const flags = shape.flags[i]!;
-    const share = shape.stress_kPa[i]! / most_kPa;
-    const colour = colouring === 'stress' ? kTissue.clone().lerp(viridis(share), Math.min(1, 4 * share)) : flags & 1 ? kFixed : flags & 2 ? kNotSeen : kSeen;
+    const fraction = shape.stress_kPa[i]! / max_kPa;
+    const colour = colouring === 'stress' ? kTissue.clone().lerp(viridis(fraction), Math.min(1, 4 * fraction)) : flags & 1 ? kFixed : flags & 2 ? kNotSeen : kSeen;
     colour.toArray(colours, 3 * i);
   }
   return colours;
@@ -49,8 +49,8 @@ class Stage {
   private edges: THREE.LineSegments | null = null;
   private isFramed = false;
   /** The highest so far, so that colours keep their meaning. */
-  private most_kPa = 1e-9;
-  private most_N = 1e-3;
+  private max_kPa = 1e-9;
+  private max_N = 1e-3;
 
   constructor(host: HTMLElement) {
     this.renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
@@ -85,10 +85,10 @@ class Stage {
     }
     this.body = this.edges = null;
     if (!shape) return this.draw();
-    this.most_kPa = shape.stress_kPa.reduce((a, b) => Math.max(a, b), this.most_kPa);
+    this.max_kPa = shape.stress_kPa.reduce((a, b) => Math.max(a, b), this.max_kPa);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(shape.positions_mm, 3));
-    geometry.setAttribute('color', new THREE.BufferAttribute(coloursOf(shape, colouring, this.most_kPa), 3));
+    geometry.setAttribute('color', new THREE.BufferAttribute(coloursOf(shape, colouring, this.max_kPa), 3));
     geometry.setIndex(new THREE.BufferAttribute(shape.triangles, 1));
     geometry.computeVertexNormals();
     const clipping = {clippingPlanes: [this.plane]};
@@ -113,8 +113,8 @@ class Stage {
     this.tip.visible = !!tip;
     if (tip) this.tip.position.set(...tip);
     const f = new THREE.Vector3(...(force ?? [0, 0, 0]));
-    this.most_N = Math.max(this.most_N, f.length());
-    const length = (kLongestArrow_mm * f.length()) / this.most_N;
+    this.max_N = Math.max(this.max_N, f.length());
+    const length = (kLongestArrow_mm * f.length()) / this.max_N;
     this.arrow.visible = !!tip && length > 0.5;
     if (tip && this.arrow.visible) {
       this.arrow.setDirection(f.clone().normalize());
@@ -124,11 +124,11 @@ class Stage {
     this.draw();
   }
 
-  /** Cuts away what lies nearer than this share of the depth. */
-  cut(share: number) {
+  /** Cuts away what lies nearer than this fraction of the depth. */
+  cut(fraction: number) {
     const ball = this.body?.geometry.boundingSphere;
     if (!ball) return;
-    this.plane.constant = share <= 0 ? 1e6 : -(ball.center.z - ball.radius + 2 * ball.radius * share);
+    this.plane.constant = fraction <= 0 ? 1e6 : -(ball.center.z - ball.radius + 2 * ball.radius * fraction);
     this.draw();
   }
 

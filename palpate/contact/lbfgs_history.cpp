@@ -1,22 +1,22 @@
-#include "palpate/contact/secants.h"
+#include "palpate/contact/lbfgs_history.h"
 
 #include <vector>
 
 namespace palpate {
 
 namespace {
-constexpr size_t kMostPairs = 8;
-constexpr double kLeastCurvature = 1e-8;
+constexpr size_t kMaxPairs = 8;
+constexpr double kMinCurvature = 1e-8;
 }  // namespace
 
-void Secants::add(const Eigen::VectorXd& s, const Eigen::VectorXd& y) {
+void LbfgsHistory::add(const Eigen::VectorXd& s, const Eigen::VectorXd& y) {
   const double sy = s.dot(y);
-  if (sy <= kLeastCurvature * s.norm() * y.norm()) return;
-  if (pairs_.size() == kMostPairs) pairs_.pop_front();
+  if (sy <= kMinCurvature * s.norm() * y.norm()) return;
+  if (pairs_.size() == kMaxPairs) pairs_.pop_front();
   pairs_.push_back({s, y, 1 / sy});
 }
 
-Eigen::VectorXd Secants::step(const BorderedSystem& system, const Eigen::VectorXd& unbalanced) const {
+Eigen::VectorXd LbfgsHistory::step(const BorderedSystem& system, const Eigen::VectorXd& unbalanced) const {
   Eigen::VectorXd q = unbalanced;
   std::vector<double> alpha(pairs_.size());
   for (size_t i = pairs_.size(); i-- > 0;) {

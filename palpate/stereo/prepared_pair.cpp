@@ -1,4 +1,4 @@
-#include "palpate/stereo/eyes.h"
+#include "palpate/stereo/prepared_pair.h"
 
 #include <tbb/parallel_invoke.h>
 
@@ -14,7 +14,7 @@ constexpr int kSaturated = 235;  // a highlight is bright in every channel
 constexpr int kBlack = 14;       // the border of the scope, and nothing lit
 constexpr int kOutshine = 100;   // grey levels above the surroundings
 constexpr int kSurroundings_px = 61;
-constexpr double kLeastRowOffset_px = 0.02;
+constexpr double kMinRowOffset_px = 0.02;
 constexpr int kHalo_px = 5;  // highlights shine into their neighbourhood
 
 // Black that touches the rim of the image.
@@ -25,7 +25,7 @@ cv::Mat black_border(const cv::Mat& brightest) {
   return framed(cv::Rect({1, 1}, brightest.size())) == 128;
 }
 
-// Of a whole image: what both eyes can see alike, and the black border.
+// Of a whole image: what both cameras can see alike, and the black border.
 struct Areas {
   cv::Mat matchable, border;
 };
@@ -55,41 +55,41 @@ cv::Mat matchable_mask(const cv::Mat& bgr) {
   return areas_of(bgr).matchable;
 }
 
-Eyes prepare_eyes(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask) {
-  struct Eye {
+PreparedPair prepare_pair(const cv::Mat& left_bgr, const cv::Mat& right_bgr, const cv::Mat& mask) {
+  struct OneCamera {
     cv::Mat grey;
     Areas areas;
     cv::Scalar mean, deviation;
   } left, right;
-  const auto look = [](const cv::Mat& bgr, Eye& eye) {
-    eye.areas = areas_of(bgr);
-    cv::cvtColor(bgr, eye.grey, cv::COLOR_BGR2GRAY);
-    cv::meanStdDev(eye.grey, eye.mean, eye.deviation, eye.areas.matchable);
+  const auto look = [](const cv::Mat& bgr, OneCamera& camera) {
+    camera.areas = areas_of(bgr);
+    cv::cvtColor(bgr, camera.grey, cv::COLOR_BGR2GRAY);
+    cv::meanStdDev(camera.grey, camera.mean, camera.deviation, camera.areas.matchable);
   };
   tbb::parallel_invoke([&] { look(left_bgr, left); }, [&] { look(right_bgr, right); });
-  Eyes eyes;
-  eyes.left_mask = left.areas.matchable & mask;
-  eyes.wanted = mask & ~left.areas.border;
-  eyes.right_mask = right.areas.matchable;
+  PreparedPair prepared;
+  prepared.left_mask = left.areas.matchable & mask;
+  prepared.wanted = mask & ~left.areas.border;
+  prepared.right_mask = right.areas.matchable;
   const double gain = right.deviation[0] > 1 ? left.deviation[0] / right.deviation[0] : 1;
-  left.grey.convertTo(eyes.left, CV_32F);
-  right.grey.convertTo(eyes.right, CV_32F, gain, left.mean[0] - gain * right.mean[0]);
-  return eyes;
+  left.grey.convertTo(prepared.left, CV_32F);
+  right.grey.convertTo(prepared.right, CV_32F, gain, left.mean[0] - gain * right.mean[0]);
+  return prepared;
 }
 
 cv::Mat rows_aligned(const cv::Mat& right, double row_offset_px) {
-  if (std::abs(row_offset_px) < kLeastRowOffset_px) return right;
+  if (std::abs(row_offset_px) < kMinRowOffset_px) return right;
   cv::Mat aligned;
   cv::warpAffine(right, aligned, cv::Matx23d(1, 0, 0, 0, 1, row_offset_px), right.size(),
                  cv::INTER_CUBIC | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
   return aligned;
 }
 
-void align_rows(Eyes& eyes, double row_offset_px) {
-  eyes.right = rows_aligned(eyes.right, row_offset_px);
+void align_rows(PreparedPair& prepared, double row_offset_px) {
+  prepared.right = rows_aligned(prepared.right, row_offset_px);
   if (std::abs(row_offset_px) < 0.5) return;
-  cv::warpAffine(eyes.right_mask, eyes.right_mask, cv::Matx23d(1, 0, 0, 0, 1, row_offset_px), eyes.right_mask.size(),
-                 cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
+  cv::warpAffine(prepared.right_mask, prepared.right_mask, cv::Matx23d(1, 0, 0, 0, 1, row_offset_px),
+                 prepared.right_mask.size(), cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
 }
 
 }  // namespace palpate

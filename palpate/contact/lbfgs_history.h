@@ -7,7 +7,7 @@
 namespace palpate {
 
 /// Curvature seen between states with the same constraint (L-BFGS, Nocedal 1980), which corrects an old factor.
-class Secants {
+class LbfgsHistory {
  public:
   void clear() { pairs_.clear(); }
 

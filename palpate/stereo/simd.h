@@ -28,7 +28,7 @@ inline void store_lanes(const FloatLanes& lanes, float* to) {
   std::memcpy(to, &lanes, sizeof(lanes));
 }
 
-inline FloatLanes all_lanes(float number) {
+inline FloatLanes all_of_simd(float number) {
   return number - FloatLanes{};
 }
 
