@@ -53,7 +53,7 @@ nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& buil
 std::string advice_for(const Scene& scene) {
   if (scene.contact.grip == Grip::push && scene.tissue.law == Law::saint_venant_kirchhoff)
     return "tissue.law is saint-venant-kirchhoff, which loses its stiffness where tissue is pressed: for a push "
-           "saint-venant-kirchhoff-barrier is the same law and keeps it";
+           "neo-hookean keeps it";
   return {};
 }
 

@@ -1,16 +1,17 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
 namespace palpate {
 
-/// The value that `fraction` (0 to 1) of the others do not exceed; 0 where there are none.
+/// The value below which `fraction` (0 to 1) of the others lie: the nearest one of them; 0 where there are none.
 template <class Value>
 Value quantile_of(std::vector<Value> values, double fraction) {
   if (values.empty()) return {};
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+  const auto place = values.begin() + std::lround(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), place, values.end());
   return *place;
 }

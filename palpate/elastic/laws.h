@@ -97,7 +97,8 @@ struct SaintVenantKirchhoff {
 };
 
 /// Saint Venant-Kirchhoff with beta b(J), b = -(J - 1)^2 ln J where J < 1 (the barrier of Li et al. 2020): the same law
-/// in tension and, to second order, at rest; infinite where an element would be flat.
+/// in tension and, to second order, at rest; infinite where an element would be flat. Its range is that of the plain
+/// law: no barrier on J gives back the shear stiffness that pressure takes away in lambda/2 tr(E)^2.
 struct SaintVenantKirchhoffBarrier : SaintVenantKirchhoff {
   static double barrier(double J) {
     if (J >= 1) return 0;
@@ -133,9 +134,6 @@ struct SaintVenantKirchhoffBarrier : SaintVenantKirchhoff {
             C(i + 3 * j, k + 3 * l) += (second + first) * G(i, j) * G(k, l) - first * G(i, l) * G(k, j);
     return C;
   }
-
-  /// The barrier outweighs what plain Saint Venant-Kirchhoff loses.
-  static bool in_valid_range(const Mat3& F) { return F.determinant() > 0; }
 };
 
 /// W = mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, theta = J.

@@ -61,10 +61,9 @@ void fill_from_preset(TissueOptions& tissue) {
 }  // namespace
 
 void describe(Settings& settings, TissueOptions& options) {
-  settings.choice(
-      "law", options.law, law_words(),
-      "elastic law; saint-venant-kirchhoff-barrier or neo-hookean for pushing, where the plain one loses its "
-      "stiffness; linear holds for small motions only");
+  settings.choice("law", options.law, law_words(),
+                  "elastic law; neo-hookean is the one to use for pushing, saint-venant-kirchhoff-barrier only keeps "
+                  "elements from turning inside out there; linear holds for small motions only");
   settings.number_or_word("young_modulus_kPa", options.young_modulus_kPa, {0, 1e8, true, false}, "unknown",
                           options.modulus_unknown,
                           "Young's modulus E; the force is proportional to it. unknown: forces are N per kPa of E, and "

