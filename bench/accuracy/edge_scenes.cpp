@@ -202,8 +202,7 @@ std::string picture_name(const std::string& name) {
 void write_picture(const std::filesystem::path& folder, const EdgeScene& scene, const Rectification& rectification,
                    const TissueMap& map) {
   const cv::Mat preview = draw_map_preview(scene.frame.left, rectification, map);
-  const cv::Mat mesh =
-                    preview({0, 0, std::min(preview.cols, scene.organ.cols), std::min(preview.rows, scene.organ.rows)}),
+  const cv::Mat mesh = preview({0, 0, preview.cols / 2, preview.rows / 2}),
                 confidence = draw_map_confidence(scene.frame.left, rectification, map);
   cv::Mat left, right, both;
   const cv::Size size(640, 360);

@@ -273,7 +273,7 @@ void close_covered(DepthCells& cells, const EdgeOptions& options) {
   }
 }
 
-bool crosses_edge(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm) {
+bool is_torn(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm) {
   const double apart_w = std::abs(1 / a_mm.z() - 1 / b_mm.z());
   bool crosses = false;
   walk(edges.cells, a_mm, b_mm, [&](const cv::Point& cell, double) {
@@ -283,14 +283,10 @@ bool crosses_edge(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm) {
     }
     return !crosses;
   });
-  return crosses || shows_another_depth(edges, a_mm, b_mm);
-}
-
-bool is_torn(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm) {
-  if (crosses_edge(edges, a_mm, b_mm)) return true;
+  if (crosses) return true;
   const double unmeasured_mm = longest_stretch_mm(
       edges.cells, a_mm, b_mm, [&](const cv::Point& cell, double) { return !edges.cells.is_known(cell); });
-  return unmeasured_mm > edges.options.max_bridge_mm;
+  return unmeasured_mm > edges.options.max_bridge_mm || shows_another_depth(edges, a_mm, b_mm);
 }
 
 bool shows_another_depth(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm) {

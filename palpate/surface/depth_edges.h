@@ -32,11 +32,8 @@ DepthEdges find_depth_edges(DepthCells cells, const EdgeOptions& options);
 /// Closes cells behind instruments where what is seen to both sides along a row or a column continues the same surface.
 void close_covered(DepthCells& cells, const EdgeOptions& options);
 
-/// Whether the way between two points of the surface, as the camera sees it, crosses an edge, or something else is seen
-/// there than a surface that connects them.
-bool crosses_edge(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm);
-
-/// Whether it does, or crosses a stretch in which nothing was measured: no face has it for a side.
+/// Whether the way between two points of the surface, as the camera sees it, crosses an edge or a stretch in which
+/// nothing was measured: no face has it for a side.
 bool is_torn(const DepthEdges& edges, const Vec3& a_mm, const Vec3& b_mm);
 
 /// Whether, between two points, something else is seen than a surface that connects them.

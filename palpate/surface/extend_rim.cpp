@@ -72,8 +72,9 @@ Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal
   return end_mm * outward + bend_mm * normal;
 }
 
-/// Shortens the steps that would draw a face over an edge, as points beyond it may lie in the reach of the rim; what
-/// crosses one however short it is stays where it was.
+/// Shortens the steps that would draw a face before something else that is seen, as points beyond an edge may lie in the
+/// reach of the rim. (Keeping them from every depth edge makes the rim of noisy recordings ragged, which costs the body
+/// more than it gains.)
 void stay_before_edges(const Surface& surface, const DepthEdges& edges, std::map<int, Vec3>& step_of) {
   const auto moved = [&](int i) -> Vec3 {
     const auto step = step_of.find(i);
@@ -84,7 +85,8 @@ void stay_before_edges(const Surface& surface, const DepthEdges& edges, std::map
     for (const Triangle& t : surface.triangles)
       for (size_t k = 0; k < 3; ++k) {
         const int a = t[k], b = t[(k + 1) % 3];
-        if ((step_of.count(a) || step_of.count(b)) && crosses_edge(edges, moved(a), moved(b))) too_far.insert({a, b});
+        if ((step_of.count(a) || step_of.count(b)) && shows_another_depth(edges, moved(a), moved(b)))
+          too_far.insert({a, b});
       }
     for (const int vertex : too_far)
       if (const auto step = step_of.find(vertex); step != step_of.end())
