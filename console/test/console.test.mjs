@@ -178,7 +178,7 @@ try {
     run('estimate', join(demo, 'scene.yaml'), '-o', join(root, 'by_terminal'), '--json');
     await tab('Source');
     await tab('Replay');
-    await page.getByLabel('run', {exact: true}).selectOption('by_terminal');
+    await page.getByRole('combobox', {name: /^run/}).selectOption('by_terminal');
     const rows = [...forcesOf(join(root, 'by_terminal/forces.csv')).values()];
     await page.locator('.scrub input[max="109"]').fill('60');
     await page.waitForFunction((text) => document.querySelector('[data-testid=force]').textContent === text, Number(rows[60].force_N).toFixed(2));
