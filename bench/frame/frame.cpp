@@ -77,6 +77,19 @@ Frames run(SceneFile scene_file, const std::string& segmentation) {
   }
 }
 
+/// "frame 12: 191 ms, 178 of them for instruments and tissue points".
+std::string slowest_of(const Frames& frames) {
+  const std::vector<double>&whole = frames.stages.back().wall_ms, &track = frames.stages[1].wall_ms;
+  std::vector<size_t> order(whole.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&whole](size_t a, size_t b) { return whole[a] > whole[b]; });
+  std::string text;
+  for (size_t k = 0; k < std::min<size_t>(4, order.size()); ++k)
+    text += fmt::format("{}{} ({:.0f} ms, {:.0f} of them for instruments and tissue points)", k == 0 ? "" : ", ",
+                        order[k], whole[order[k]], track[order[k]]);
+  return text;
+}
+
 std::string table_of(const std::filesystem::path& scene) {
   const SceneFile scene_file = read_scene_file(scene, true);
   std::string table = fmt::format(
@@ -97,7 +110,7 @@ std::string table_of(const std::filesystem::path& scene) {
   }
   table += fmt::format("| processor time of a frame | {:.1f} / {:.1f} | {:.1f} / {:.1f} | |\n", at(colour.cpu_ms, 0.5),
                        at(colour.cpu_ms, 0.99), at(learned.cpu_ms, 0.5), at(learned.cpu_ms, 0.99));
-  return table;
+  return table + "\nSlowest frames: " + slowest_of(learned) + ".\n";
 }
 
 void write_into(const std::filesystem::path& page, const std::string& table) {
