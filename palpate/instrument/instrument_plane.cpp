@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 
 #include "palpate/stereo/seeds.h"
 
@@ -17,8 +19,9 @@ using Matrix4 = Eigen::Matrix4d;
 constexpr LayerNoise kNoise{30, 24};
 constexpr double kSlopeDeviation = 0.05;  // px/px along the axis; a shaft that halves its depth over the image has 0.05
 constexpr double kSlopeAcross = 0.01;     // the outline of a round shaft lies square to the line of sight
-constexpr double kSlopeChange = 0.003;    // from frame to frame
-constexpr double kRowFloor_px = 0.06;     // of an outline, which light moves differently in both cameras
+/// From frame to frame: a hand that goes 6 mm in one turns a steep shaft by as much.
+constexpr double kSlopeChange = 0.01;
+constexpr double kRowFloor_px = 0.06;  // of an outline, which light moves differently in both cameras
 constexpr size_t kMinMatches = 60;
 constexpr double kMinDisparity_px = 2, kMaxDisparity_px = 200;
 constexpr double kMinAgreement = 0.35;
@@ -86,7 +89,9 @@ struct Expected {
 
 Expected expected_plane(const ImageTip& tip, const PlanePrior& prior) {
   const Eigen::Vector2d along(tip.axis.x, tip.axis.y), across(-tip.axis.y, tip.axis.x);
-  const double along_deviation = prior.before ? kSlopeChange : kSlopeDeviation;
+  const double along_deviation =
+      prior.before ? std::min(kSlopeDeviation, std::hypot(prior.before->slope_deviation, kSlopeChange))
+                   : kSlopeDeviation;
   Expected expected;
   expected.information.block<2, 2>(1, 1) = along * along.transpose() / std::pow(along_deviation, 2) +
                                            across * across.transpose() / std::pow(kSlopeAcross, 2);
@@ -129,8 +134,10 @@ std::optional<InstrumentPlane> match_instrument(const PatchTemplate& left, const
   plane.row_offset_px = p[3];
   plane.agreement = system.agreement();
   const double noise = std::max(0.1, system.squared_error / std::max(system.weight, 1.0));
-  plane.disparity_deviation_px =
-      std::sqrt(kCorrelatedNoise * noise * (system.normal + expected_normal).inverse()(0, 0));
+  const Matrix4 covariance = kCorrelatedNoise * noise * (system.normal + expected_normal).inverse();
+  plane.disparity_deviation_px = std::sqrt(covariance(0, 0));
+  const Eigen::Vector2d along(tip.axis.x, tip.axis.y);
+  plane.slope_deviation = std::sqrt(along.dot(covariance.block<2, 2>(1, 1) * along));
   return plane;
 }
 

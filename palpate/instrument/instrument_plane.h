@@ -13,6 +13,7 @@ struct InstrumentPlane {
   Eigen::Vector3d disparity = Eigen::Vector3d::Zero();  ///< at the origin, px; its slope in x and in y, px/px
   double row_offset_px = 0;                             ///< right row minus left row
   double disparity_deviation_px = 0;                    ///< of the disparity at the origin
+  double slope_deviation = 0;                           ///< of the slope along the axis, px/px
   double agreement = 0;                                 ///< fraction of the template's gradients that fit, 0..1
 
   double disparity_at(const cv::Point2d& left_px) const {
@@ -33,7 +34,8 @@ RowOffset measure_row_offset(const cv::Mat& left_bgr, const cv::Mat& right_bgr);
 struct PlanePrior {
   double disparity_px = 0;  ///< at the tip; searched +- 12 px around
   RowOffset rows;
-  const InstrumentPlane* before = nullptr;  ///< of the last frame, if it had one: the slope changes little
+  const InstrumentPlane* before =
+      nullptr;  ///< of the last frame, if it had one: the slope changes little from what was known
 };
 
 /// Aligns the left template with the right image. Nothing when too little of it fits.
