@@ -72,9 +72,9 @@ Vec3 step_to_the_end(const Vec3& vertex, const Vec3& outward, const Vec3& normal
   return end_mm * outward + bend_mm * normal;
 }
 
-/// Shortens the steps that would draw a face before something else that is seen, as points beyond an edge may lie in the
-/// reach of the rim. (Keeping them from every depth edge makes the rim of noisy recordings ragged, which costs the body
-/// more than it gains.)
+/// Shortens the steps that would draw a face before something else that is seen, as points beyond an edge may lie in
+/// the reach of the rim. (Keeping them from every depth edge makes the rim of noisy recordings ragged, which costs the
+/// body more than it gains.)
 void stay_before_edges(const Surface& surface, const DepthEdges& edges, std::map<int, Vec3>& step_of) {
   const auto moved = [&](int i) -> Vec3 {
     const auto step = step_of.find(i);
