@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
+#include <array>
 #include <memory>
-#include <sstream>
 #include <vector>
 
 #include "app/answer.h"
@@ -21,18 +20,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file);
-  std::stringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
+/// What the sheet of results has of each sequence, as score.py has it; names of figures_of().
+constexpr std::array kSheet = {"force_nrmse_pct",
+                               "gain",
+                               "direction_error_deg_median",
+                               "onset_error_frames",
+                               "release_error_frames",
+                               "false_contact_frames",
+                               "missed_force_frames",
+                               "reversed_ok_frames",
+                               "band_coverage_pct",
+                               "band_half_width_pct"};
 
 /// The scenes that the sequences are made of, by name.
-std::vector<fs::path> scenes_of(const fs::path& share, const std::vector<std::string>& only) {
+std::vector<fs::path> scenes_of(const fs::path& handed_out, const std::vector<std::string>& only) {
   std::vector<fs::path> all, chosen;
   std::string names;
-  for (const auto& entry : fs::directory_iterator(share))
+  for (const auto& entry : fs::directory_iterator(handed_out))
     if (entry.path().extension() == ".yaml") all.push_back(entry.path());
   std::sort(all.begin(), all.end());
   for (const fs::path& scene : all) names += (names.empty() ? "" : ", ") + scene.stem().string();
@@ -52,38 +56,36 @@ double size_MB(const fs::path& folder) {
   return bytes * 1e-6;
 }
 
-/// One line of the sheet of results, as score.py writes it.
+/// One line of the sheet of results.
 std::string sheet_row(const std::string& name, const Comparison& comparison) {
   const auto all = figures_of(comparison);
   std::string row = name;
-  for (const char* wanted : {"force_nrmse_pct", "gain", "direction_error_deg_median", "onset_error_frames",
-                             "release_error_frames", "false_contact_frames", "missed_force_frames",
-                             "reversed_ok_frames", "band_coverage_pct", "band_half_width_pct"})
+  for (const std::string wanted : kSheet)
     for (const auto& [figure, value] : all)
       if (figure == wanted) row += "," + (value.index() == 0 ? "" : figure_text(value));
   return row + "\n";
 }
 
 void export_benchmark(const fs::path& folder, const std::vector<std::string>& only, bool quiet) {
-  const fs::path share = share_folder() / "benchmark";
-  if (!fs::exists(share / "score.py"))
+  const fs::path handed_out = share_folder() / "benchmark";
+  if (!fs::exists(handed_out / "score.py"))
     throw BadInput(
         fmt::format("{}: the benchmark's scenes are not there, expected beside the program (cmake "
                     "--install puts them there)",
-                    share.string()));
-  const std::vector<fs::path> scenes = scenes_of(share, only);
+                    handed_out.string()));
+  const std::vector<fs::path> scenes = scenes_of(handed_out, only);
   require_output_folder(folder);
   fs::create_directories(folder / "results");
-  for (const char* name : {"README.md", "score.py"}) write_whole_file(folder / name, text_of(share / name));
-  std::string sheet =
-      "sequence,force_nrmse_pct,gain,direction_error_deg_median,onset_error_frames,release_error_frames,"
-      "false_contact_frames,missed_force_frames,reversed_ok_frames,band_coverage_pct,band_half_width_pct\n";
+  for (const char* name : {"README.md", "score.py"})
+    write_whole_file(folder / name, read_whole_file(handed_out / name));
+  std::string sheet = fmt::format("sequence,{}\n", fmt::join(kSheet, ","));
   for (size_t i = 0; i < scenes.size(); ++i) {
-    const std::string name = scenes[i].stem().string(), made_of = text_of(scenes[i]);
+    const std::string name = scenes[i].stem().string(), made_of = read_whole_file(scenes[i]);
     const fs::path sequence = folder / name, results = folder / "results" / name;
     if (!quiet) fmt::print(stderr, "{} of {}: {}\n", i + 1, scenes.size(), name);
-    // What stands there from an earlier, interrupted run is taken as it is.
-    if (text_of(sequence / "made_of.yaml") != made_of) {
+    // What stands there from an earlier, interrupted run is taken as it is, with the results that belong to it.
+    if (read_whole_file(sequence / "made_of.yaml") != made_of) {
+      fs::remove_all(results);
       DejaVuSummary summary;
       simulate_into(read_scene_file(scenes[i], false), sequence, quiet, summary);
       write_whole_file(sequence / "made_of.yaml", made_of);

@@ -51,9 +51,13 @@ nlohmann::ordered_json json_of(const SceneFile& scene_file, const BuiltMap& buil
 
 /// What would go better, though nothing is wrong; empty where nothing is to be said.
 std::string advice_for(const Scene& scene) {
-  if (scene.contact.grip == Grip::push && scene.tissue.law == Law::saint_venant_kirchhoff)
-    return "tissue.law is saint-venant-kirchhoff, which loses its stiffness where tissue is pressed: for a push "
-           "neo-hookean keeps it";
+  const Law law = scene.tissue.law;
+  if (scene.contact.grip == Grip::push &&
+      (law == Law::saint_venant_kirchhoff || law == Law::saint_venant_kirchhoff_barrier))
+    return fmt::format(
+        "tissue.law is {}, which loses its stiffness where tissue is pressed: for a push neo-hookean "
+        "keeps it",
+        law_name(law));
   return {};
 }
 

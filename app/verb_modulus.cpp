@@ -1,36 +1,18 @@
 #include <fmt/format.h>
 
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "app/answer.h"
 #include "app/modulus.h"
 #include "app/run.h"
 #include "app/verbs.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
 
 namespace palpate::app {
 
 namespace {
-
-std::string read_text(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
-/// Whole, or as it was.
-void replace_file(const std::filesystem::path& file, const std::string& text) {
-  std::filesystem::path part = file;
-  part += ".part";
-  std::ofstream stream(part, std::ios::binary);
-  stream << text;
-  if (!stream.flush()) throw Unfinished(fmt::format("{}: cannot be written", file.string()));
-  stream.close();
-  std::filesystem::rename(part, file);
-}
 
 std::string modulus_yaml(const MeasuredModulus& found, const TissueOptions& tissue) {
   return fmt::format(
@@ -69,7 +51,7 @@ void add_modulus(CLI::App& app) {
     const KnownForce known = arguments->known_force.empty() ? KnownForce{} : parse_known_force(arguments->known_force);
     SceneFile scene_file = read_scene_file(arguments->scene, true);
     const TissueOptions& tissue = scene_file.scene.tissue;
-    if (arguments->write) with_modulus(read_text(arguments->scene), 1, tissue.poisson_ratio);
+    if (arguments->write) with_modulus(read_whole_file(arguments->scene), 1, tissue.poisson_ratio);
     scene_file.scene.uncertainty.young_modulus_factor = 1;  // it is what is asked
     const std::vector<ForceRow> rows = estimate_rows(scene_file, arguments->json);
     const MeasuredModulus found = arguments->sensor.empty()
@@ -77,10 +59,10 @@ void add_modulus(CLI::App& app) {
                                       : modulus_from_sensor(rows, tissue.young_modulus_kPa, arguments->sensor);
     std::filesystem::path written = arguments->scene;
     written.replace_extension(".modulus.yaml");
-    replace_file(written, modulus_yaml(found, tissue));
+    write_whole_file(written, modulus_yaml(found, tissue));
     if (arguments->write)
-      replace_file(arguments->scene,
-                   with_modulus(read_text(arguments->scene), found.young_modulus_kPa, tissue.poisson_ratio));
+      write_whole_file(arguments->scene,
+                       with_modulus(read_whole_file(arguments->scene), found.young_modulus_kPa, tissue.poisson_ratio));
     if (arguments->json) {
       fmt::print("{}", json_success({{"young_modulus_kPa", found.young_modulus_kPa},
                                      {"young_modulus_low_kPa", found.low_kPa},

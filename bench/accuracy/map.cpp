@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
 #include <set>
-#include <sstream>
 
 #include "bench/accuracy/edge_scenes.h"
 #include "bench/accuracy/surface_tables.h"
+#include "bench/page.h"
 #include "palpate/core/stopwatch.h"
 #include "palpate/estimate/scene.h"
 #include "palpate/surface/cocone.h"
@@ -146,20 +145,6 @@ std::string phi_table() {
   return table;
 }
 
-/// The page with everything between its markers replaced.
-void write_into(const std::filesystem::path& page, const std::string& tables) {
-  std::ifstream stream(page);
-  std::stringstream whole;
-  whole << stream.rdbuf();
-  const std::string text = whole.str();
-  const size_t begin = text.find(kBegin), end = text.find(kEnd);
-  if (begin == std::string::npos || end == std::string::npos) {
-    fmt::print(stderr, "{} has no place for the tables\n", page.string());
-    std::exit(EXIT_FAILURE);
-  }
-  std::ofstream(page) << text.substr(0, begin + kBegin.size()) << "\n" << tables << "\n" << text.substr(end);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -183,6 +168,6 @@ int main(int argc, char** argv) {
     const std::filesystem::path page = argc == 2 ? argv[1] : "";
     return edge_table(page.empty() ? page : page.parent_path() / "images/edges");
   });
-  if (argc == 2) write_into(argv[1], tables);
+  if (argc == 2) bench::write_between(argv[1], kBegin, kEnd, tables);
   return EXIT_SUCCESS;
 }

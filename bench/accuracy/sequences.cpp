@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 
 #include "app/simulation.h"
 #include "palpate/core/errors.h"
+#include "palpate/core/whole_file.h"
 
 namespace palpate {
 namespace {
@@ -16,16 +15,10 @@ namespace {
 constexpr const char* kMadeOf = "made_of.yaml";
 constexpr int kSeedStep = 100;  // seeds of different looks are far apart
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
 bool is_rendered(const YAML::Node& scene, const std::filesystem::path& folder) {
-  return text_of(folder / kMadeOf) == scene_text(scene);
+  return read_whole_file(folder / kMadeOf) == scene_text(scene);
 }
 
 Sequence rendered(const std::string& name, const YAML::Node& scene, const std::filesystem::path& folder) {

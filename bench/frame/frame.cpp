@@ -4,13 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <thread>
 #include <vector>
 
 #include "app/run.h"
 #include "app/runtime.h"
+#include "bench/page.h"
 #include "bench/runtime/machine_limits.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/stopwatch.h"
@@ -113,17 +112,6 @@ std::string table_of(const std::filesystem::path& scene) {
   return table + "\nSlowest frames: " + slowest_of(learned) + ".\n";
 }
 
-void write_into(const std::filesystem::path& page, const std::string& table) {
-  std::ifstream stream(page);
-  std::stringstream whole;
-  whole << stream.rdbuf();
-  const std::string text = whole.str();
-  const size_t begin = text.find(kBegin), end = text.find(kEnd);
-  if (begin == std::string::npos || end == std::string::npos)
-    throw BadInput(fmt::format("{} has no place for the table", page.string()));
-  std::ofstream(page) << text.substr(0, begin + kBegin.size()) << "\n" << table << "\n" << text.substr(end);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -136,7 +124,7 @@ int main(int argc, char** argv) {
   try {
     const std::string table = table_of(scene);
     fmt::print("{}", table);
-    if (!page.empty()) write_into(page, table);
+    if (!page.empty()) bench::write_between(page, kBegin, kEnd, table);
   } catch (const BadInput& reason) {
     fmt::print(stderr, "bench_frame: {}\n", reason.what());
     return 3;

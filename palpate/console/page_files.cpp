@@ -1,7 +1,5 @@
 #include "palpate/console/page_files.h"
-
-#include <fstream>
-#include <sstream>
+#include "palpate/core/whole_file.h"
 
 namespace palpate {
 
@@ -27,10 +25,8 @@ PageFiles read_page_files(const std::filesystem::path& folder) {
   std::error_code error;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder, error)) {
     if (!entry.is_regular_file()) continue;
-    std::ostringstream bytes;
-    bytes << std::ifstream(entry.path(), std::ios::binary).rdbuf();
     files["/" + entry.path().lexically_relative(folder).generic_string()] = {type_of(entry.path().extension().string()),
-                                                                             bytes.str()};
+                                                                             read_whole_file(entry.path())};
   }
   if (const auto index = files.find("/index.html"); index != files.end()) files["/"] = index->second;
   return files;

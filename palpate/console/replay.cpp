@@ -2,15 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/videoio.hpp>
-#include <sstream>
 
 #include "palpate/console/pictures.h"
 #include "palpate/console/row_json.h"
 #include "palpate/core/table.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/feedback/forces_file.h"
 #include "palpate/session/shape.h"
 
@@ -24,12 +23,6 @@ constexpr int kDeepest = 4;
 constexpr size_t kMaxRuns = 500;
 /// A jump further ahead than this is quicker than reading on.
 constexpr int kReadOn_frames = 60;
-
-std::string content_of(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 /// The video that was asked for last, where it stands.
 struct OpenVideo {
@@ -79,7 +72,7 @@ Answer replay_rows(const std::filesystem::path& folder) {
   for (const ShapePlace& place : shape_places(folder / "shapes.bin")) json["shapes"].push_back(place.frame);
   json["has_report"] = std::filesystem::exists(folder / "report.html");
   json["has_video"] = std::filesystem::exists(folder / "overlay.mp4");
-  json["marks"] = content_of(folder / "marks.csv");
+  json["marks"] = read_whole_file(folder / "marks.csv");
   return {200, "application/json", json.dump(-1, ' ', false, ordered_json::error_handler_t::replace)};
 }
 
@@ -111,7 +104,7 @@ Answer replay_shape(const std::filesystem::path& folder, int frame) {
 }
 
 Answer replay_report(const std::filesystem::path& folder) {
-  return {200, "text/html; charset=utf-8", content_of(folder / "report.html")};
+  return {200, "text/html; charset=utf-8", read_whole_file(folder / "report.html")};
 }
 
 }  // namespace palpate

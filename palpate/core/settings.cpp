@@ -6,12 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/settings_file.h"
 #include "palpate/core/source_kind.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/core/yaml_tree.h"
 
 namespace palpate {
@@ -537,11 +536,10 @@ void read_settings(const YAML::Node& node, const SettingsContext& context, Setti
 YAML::Node load_settings_file(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
-  std::ostringstream content;
-  content << std::ifstream(file, std::ios::binary).rdbuf();
-  if (!is_text(content.str())) throw BadInput(fmt::format("{} is no text, expected a YAML scene file", file.string()));
+  const std::string content = read_whole_file(file);
+  if (!is_text(content)) throw BadInput(fmt::format("{} is no text, expected a YAML scene file", file.string()));
   try {
-    YAML::Node root = YAML::Load(content.str());
+    YAML::Node root = YAML::Load(content);
     require_tree(root);
     return root;
   } catch (const YAML::Exception& error) {

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/table_text.h"
 #include "palpate/core/units.h"
+#include "palpate/core/whole_file.h"
 
 namespace palpate {
 
@@ -89,9 +88,7 @@ Table::Table(const std::filesystem::path& file, const std::vector<TableColumn>& 
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(
         fmt::format("{} {}, expected a table with a header that names its columns", file.string(), obstacle));
-  std::ostringstream content;
-  content << std::ifstream(file, std::ios::binary).rdbuf();
-  text_ = as_utf8(content.str());
+  text_ = as_utf8(read_whole_file(file));
   find_header(columns);
 
   LineSplitter lines(text_, separator_);

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 
 #include "palpate/core/errors.h"
@@ -23,6 +24,12 @@ void require_room(const std::filesystem::path& file, std::uintmax_t bytes) {
       std::filesystem::space(std::filesystem::absolute(file).parent_path(), error);
   if (!error && space.available < bytes + kLeftForRows_bytes)
     throw Unfinished(fmt::format("{} cannot be written: the disk is full", file.string()));
+}
+
+std::string read_whole_file(const std::filesystem::path& file) {
+  std::ostringstream bytes;
+  bytes << std::ifstream(file, std::ios::binary).rdbuf();
+  return bytes.str();
 }
 
 void write_whole_file(const std::filesystem::path& file, std::string_view bytes) {

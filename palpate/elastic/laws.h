@@ -97,7 +97,7 @@ struct SaintVenantKirchhoff {
 };
 
 /// Saint Venant-Kirchhoff with beta b(J), b = -(J - 1)^2 ln J where J < 1 (the barrier of Li et al. 2020): the same law
-/// in tension and, to second order, at rest; infinite where an element would be flat. Its range is that of the plain
+/// where J >= 1 and, to second order, at rest; infinite where an element would be flat. Its range is that of the plain
 /// law: no barrier on J gives back the shear stiffness that pressure takes away in lambda/2 tr(E)^2.
 struct SaintVenantKirchhoffBarrier : SaintVenantKirchhoff {
   static double barrier(double J) {

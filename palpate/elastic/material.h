@@ -60,7 +60,7 @@ Lame lame_of(const TissueOptions& tissue, int label);
 /// Strain energy per rest volume, N mm / mm^3.
 ///   saint-venant-kirchhoff: lambda/2 tr(E)^2 + mu E:E
 ///   saint-venant-kirchhoff-barrier: the same, and where J = det F < 1 also -beta (J - 1)^2 ln J, beta = (lambda + 2
-///   mu) / 20: the least that keeps confined compression stiff for every Poisson's ratio is (lambda + 2 mu) / 36
+///   mu) / 20, with which free and confined compression stiffen all the way for every Poisson's ratio
 ///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus,
 ///   CalculiX)
 ///   corotated:              lambda/2 tr(S - I)^2 + mu |S - I|^2 with F = R S, R a rotation also where F is inverted
@@ -85,8 +85,9 @@ Mat3 volume_ratio_gradient(Law law, const Mat3& F);
 Mat9 volume_ratio_curvature(Law law, const Mat3& F);
 
 /// Whether the law means something at F; beyond, its answer is not to be trusted.
-///   saint-venant-kirchhoff: every stretch above 1/sqrt(3), below which more compression takes less force
-///   saint-venant-kirchhoff-barrier, neo-hookean: not inverted
+///   saint-venant-kirchhoff: every stretch above 1/sqrt(3), below which more compression takes less force; with its
+///   barrier the same
+///   neo-hookean:            not inverted
 ///   corotated:              not inverted, and the sum of any two stretches above 1, below which shear has no stiffness
 ///   linear:                 |F - I| <= 0.1: strain and rotation are small
 bool in_valid_range(Law law, const Mat3& F);

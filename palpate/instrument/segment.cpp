@@ -23,7 +23,7 @@ constexpr double kMinContinued_px = 3;   // at half size
 constexpr double kMinNew = 0.2;          // fraction of an instrument that was not there in the static frame
 constexpr double kMuchMore = 1.5;        // times what was found without what is still
 constexpr double kLeftFraction = 0.9;    // of a part that stood still, where tissue shows instead
-constexpr double kLit = 1.5;             // times the least value, to tell tissue from shadow
+constexpr double kLit = 1.5;             // times min_value, to tell tissue from shadow
 constexpr double kBlack = 8;             // grey levels of what is around the picture
 constexpr double kBlackFraction = 0.05;  // the same, of the picture's brightness, where the surround is lit a little
 constexpr int kDarkest = 12;             // grey levels
@@ -438,9 +438,11 @@ cv::Mat segment_instrument(const cv::Mat& bgr, const SegmentationModel& model) {
   cv::Mat coarse = instrument_blobs(grey & ~still, half_area);
   // An instrument that stood at the border in the static frame, too short to be recognised, hangs on what is still, or
   // is cut in two by it.
-  const cv::Mat joined = instrument_blobs(grey & ~(still & ~model.still_at_border), half_area);
-  const int now = cv::countNonZero(joined), fresh = cv::countNonZero(joined & ~still);
-  if (fresh >= kMinNew * now && fresh > kMuchMore * cv::countNonZero(coarse)) coarse = joined;
+  if (cv::countNonZero(still & model.still_at_border) > 0) {
+    const cv::Mat joined = instrument_blobs(grey & ~(still & ~model.still_at_border), half_area);
+    const int now = cv::countNonZero(joined), fresh = cv::countNonZero(joined & ~still);
+    if (fresh >= kMinNew * now && fresh > kMuchMore * cv::countNonZero(coarse)) coarse = joined;
+  }
   if (cv::countNonZero(coarse) == 0) return cv::Mat::zeros(bgr.size(), CV_8U);
   const cv::Mat further = continued(half, grey & ~still, coarse, model);
   return refine(bgr, coarse | further, further, model);

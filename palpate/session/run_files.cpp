@@ -102,7 +102,8 @@ RunFrame RunFiles::add(const PlayedFrame& played, ForceEstimate estimate) {
   forces_2.write(estimate);
   pictures.offer(picture, estimate);
   rows.push_back(to_row(estimate));
-  if (!played.passed_over) times.push_back(estimate.times);
+  const bool shows_nothing = left.empty() && played.frame.right.empty();
+  if (!played.passed_over && !shows_nothing) times.push_back(estimate.times);
   if (estimate.in_contact) contact_times.push_back(estimate.times);
   return {std::move(estimate), picture, played.taken_ns, played.decoded_ns};
 }

@@ -6,9 +6,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
-#include <fstream>
 #include <mutex>
-#include <sstream>
 #include <thread>
 
 #include "palpate/core/clock.h"
@@ -35,9 +33,7 @@ bool is_passed_over(const ForceEstimate& estimate) {
 std::string text_of_file(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
+  return read_whole_file(file);
 }
 
 }  // namespace

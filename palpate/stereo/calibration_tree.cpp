@@ -7,12 +7,12 @@
 #include <boost/property_tree/ptree.hpp>
 #include <boost/property_tree/xml_parser.hpp>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/table_text.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/core/yaml_tree.h"
 
 namespace palpate {
@@ -328,9 +328,7 @@ std::string name_as_key(const std::filesystem::path& file) {
 std::string content_of(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a calibration file", file.string(), obstacle));
-  std::stringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
+  return read_whole_file(file);
 }
 
 void refuse_binary(const std::filesystem::path& file, const std::string& content) {
@@ -393,9 +391,7 @@ bool is_bare_numbers(const std::filesystem::path& file) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   if (error || size == 0 || size > kLargest) return false;
-  std::stringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return numbers_in(text.str()).has_value();
+  return numbers_in(read_whole_file(file)).has_value();
 }
 
 }  // namespace palpate

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <regex>
@@ -13,6 +12,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/quantile.h"
 #include "palpate/core/table_text.h"
+#include "palpate/core/whole_file.h"
 
 namespace palpate {
 
@@ -41,9 +41,7 @@ std::optional<double> time_of_day_s(const std::string& text) {
 
 /// Lines without a time at their beginning are headers and comments.
 std::vector<TimedName> lines_of(const std::filesystem::path& file, bool& is_clock) {
-  std::ostringstream content;
-  content << std::ifstream(file, std::ios::binary).rdbuf();
-  std::istringstream stream(as_utf8(content.str()));
+  std::istringstream stream(as_utf8(read_whole_file(file)));
   std::vector<TimedName> lines;
   is_clock = false;
   for (std::string line; std::getline(stream, line);) {

@@ -6,12 +6,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/core/table_text.h"
+#include "palpate/core/whole_file.h"
 #include "palpate/volume/body_remarks.h"
 #include "palpate/volume/mesh_bytes.h"
 
@@ -141,9 +140,7 @@ auto of_file(const std::filesystem::path& file, const Use& use) {
                  [](unsigned char c) { return std::tolower(c); });
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a volume or a closed surface", file.string(), obstacle));
-  std::ostringstream stream;
-  stream << std::ifstream(file, std::ios::binary).rdbuf();
-  const std::string bytes = stream.str();
+  const std::string bytes = read_whole_file(file);
   for (const MeshKind& kind : registry()) {
     if (std::find(kind.extensions.begin(), kind.extensions.end(), extension) == kind.extensions.end()) continue;
     try {

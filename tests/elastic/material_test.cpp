@@ -249,7 +249,7 @@ TEST(Material, TheLawsSayWhereTheyEnd) {
   EXPECT_LT(stress(0.575), stress(0.55));
 }
 
-TEST(Material, WithItsBarrierThePapersLawResistsEveryCompressionAndIsTheSameInTension) {
+TEST(Material, WithItsBarrierThePapersLawStiffensInCompressionAndIsTheSameWhereTheVolumeGrows) {
   const Law plain = Law::saint_venant_kirchhoff, barrier = Law::saint_venant_kirchhoff_barrier;
   for (const double nu : {0.0, 0.3, 0.45, 0.49, 0.499}) {
     const Lame lame = lame_of({barrier, 27, nu, ""});

@@ -32,6 +32,20 @@ TEST(InstrumentTracker, FollowsADrawnInstrument) {
   }
 }
 
+TEST(InstrumentTracker, KnowsTheDepthOfASteepShaftThatComesInFast) {
+  test::DrawnInstrument instrument;
+  instrument.direction = Vec3(-0.6, -0.2, 0.75).normalized();
+  const Vec3 end_mm = instrument.tip_mm;
+  InstrumentTracker tracker({}, test::drawn_rectification(), test::draw_pair({.instrument = false}, {}, 0), {});
+  for (int frame = 1; frame < 14; ++frame) {
+    instrument.tip_mm = end_mm - 5.0 * std::max(0, 9 - frame) * instrument.direction;
+    const auto seen = tracker.update(test::draw_pair({}, instrument, frame)).tips[0];
+    if (frame < 9) continue;
+    ASSERT_TRUE(seen.visible) << "frame " << frame;
+    EXPECT_LT(std::abs(seen.tip_mm.z() - instrument.tip_mm.z()), 1.5) << "frame " << frame;
+  }
+}
+
 TEST(InstrumentTracker, MeasuresTheDisplacementSinceTheMarkMuchBetterThanTheTip) {
   test::DrawnInstrument instrument;
   const Vec3 start = instrument.tip_mm;

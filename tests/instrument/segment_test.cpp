@@ -27,6 +27,18 @@ TEST(Segment, SeesAnInstrumentThatIsInTheStaticFrameAlready) {
   EXPECT_GT(overlap(segment_instrument(pair.left, model), test::drawn_mask(instrument)), 0.95);
 }
 
+TEST(Segment, SeesTheWholeShaftWhereItsEndStoodAtTheBorderInTheStaticFrame) {
+  test::DrawnInstrument instrument;
+  const Vec3 inside_mm = instrument.tip_mm;
+  for (const double back_mm : {42.0, 44.0, 46.0}) {
+    instrument.tip_mm = inside_mm - back_mm * instrument.direction;
+    const auto model = learn_segmentation(test::draw_pair({}, instrument, 0).left, {});
+    instrument.tip_mm = inside_mm;
+    const cv::Mat seen = segment_instrument(test::draw_pair({}, instrument, 1).left, model);
+    EXPECT_GT(overlap(seen, test::drawn_mask(instrument)), 0.9) << back_mm << " mm back in the static frame";
+  }
+}
+
 TEST(Segment, FindsNothingOnTissue) {
   const auto empty = test::draw_pair({.instrument = false}, {}, 0);
   const auto model = learn_segmentation(empty.left, {});
