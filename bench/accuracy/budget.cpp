@@ -54,6 +54,7 @@ std::string nrmse(const std::optional<Measured>& measured) {
 
 /// One line of the error budget: how far the tip is off, and the force with the true tip, the true volume and both.
 std::string budget_row(const Case& c, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
   const std::vector<ForceRow> truth = read_truth(c.sequence.truth);
   const std::filesystem::path track = std::filesystem::absolute(folder / (c.name + "_true_tip.csv"));
   write_true_track(truth, track);

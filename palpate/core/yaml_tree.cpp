@@ -1,6 +1,9 @@
 #include "palpate/core/yaml_tree.h"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
+
+#include <sstream>
 
 namespace palpate {
 
@@ -21,11 +24,44 @@ void count(const YAML::Node& node, int depth, int& nodes) {
     }
 }
 
+/// Where the documents of a stream begin.
+class DocumentStarts : public YAML::EventHandler {
+ public:
+  YAML::Mark last = YAML::Mark::null_mark();
+
+  void OnDocumentStart(const YAML::Mark& mark) override { last = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+void require_end(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  DocumentStarts starts;
+  for (int previous = -1; parser.HandleNextDocument(starts); previous = starts.last.pos)
+    if (starts.last.pos <= previous)
+      throw YAML::ParserException(starts.last,
+                                  "the document ends here; what follows begins none (a bracket too many?)");
+}
+
 }  // namespace
 
 void require_tree(const YAML::Node& document) {
   int nodes = 0;
   count(document, 0, nodes);
+}
+
+std::vector<YAML::Node> load_documents(const std::string& text) {
+  require_end(text);
+  std::vector<YAML::Node> documents = YAML::LoadAll(text);
+  for (const YAML::Node& document : documents) require_tree(document);
+  return documents;
 }
 
 }  // namespace palpate

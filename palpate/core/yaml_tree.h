@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 namespace YAML {
 class Node;
 }
@@ -9,5 +12,9 @@ namespace palpate {
 /// A YAML file may hold an alias within its own anchor, which has no end, or aliases that multiply to more than fits
 /// into memory. Throws YAML::ParserException where the document is no tree of credible size.
 void require_tree(const YAML::Node& document);
+
+/// Every document of a stream, each a tree. Throws YAML::ParserException, also where a bracket is closed that was not
+/// opened: yaml-cpp begins a new document there without end.
+std::vector<YAML::Node> load_documents(const std::string& text);
 
 }  // namespace palpate

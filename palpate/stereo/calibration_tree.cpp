@@ -112,8 +112,7 @@ Node parse_yaml(const std::string& text) {
     if (!line.starts_with("%YAML")) plain += line + "\n";
   std::replace(plain.begin(), plain.end(), '\t', ' ');
   Node root;
-  for (const YAML::Node& document : YAML::LoadAll(plain)) {
-    require_tree(document);
+  for (const YAML::Node& document : load_documents(plain)) {
     if (document.IsMap() || document.IsSequence())
       root.children.push_back(from_yaml(document, fmt::format("[{}]", root.children.size())));
   }

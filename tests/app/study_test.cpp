@@ -13,21 +13,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kScene = R"(map: {elements: 600}
-tissue: {law: linear, young_modulus_kPa: 10, poisson_ratio: 0.3}
-attachments: [{underside: {depth_mm: 8}}]
-contact: {footprint_radius_mm: 5, grip: grasp}
-simulate:
-  body: {shape: slab, size_mm: [80, 60, 30], center_mm: [0, 0, 90], elements: 900}
-  camera: {width: 480, height: 270, focal_px: 350, baseline_mm: 5, fps: 10}
-  gesture:
-    - {approach_s: 0.5, at_px: [240, 135]}
-    - {grasp: true}
-    - {move_mm: [2, 0, 0], during_s: 0.4}
-    - {hold_s: 0.2}
-    - {release: true, leave_s: 0.2}
-)";
-
 constexpr const char* kStudy = R"(title: Small
 experiments:
   - name: plain
@@ -60,7 +45,8 @@ std::vector<std::string> found_in(const std::string& text, const std::string& pa
 class Study : public testing::Test {
  protected:
   void SetUp() override {
-    write_file(workspace / "slab.yaml", kScene);
+    std::filesystem::copy_file(PALPATE_SOURCE_DIR "/tests/app/slab.yaml", workspace / "slab.yaml",
+                               std::filesystem::copy_options::overwrite_existing);
     write_file(workspace / "study.yaml", kStudy);
   }
   Outcome study(const std::string& more) const {

@@ -61,30 +61,16 @@ slurmd -f "$SLURM_CONF" -N "$node"
 for _ in $(seq 30); do [ "$(sinfo -h -o %T 2>/dev/null)" = idle ] && break || sleep 1; done
 [ "$(sinfo -h -o %T)" = idle ] || { echo "cluster: the node does not come up"; tail "$work"/slurm*.log; exit 1; }
 
-cat >"$work/slab.yaml" <<TEXT
-map: {elements: 600, thickness_mm: 30}
-tissue: {law: linear, young_modulus_kPa: 10, poisson_ratio: 0.3}
-attachments: [{underside: {depth_mm: 8}}]
-contact: {footprint_radius_mm: 5, grip: grasp}
-simulate:
-  body: {shape: slab, size_mm: [80, 60, 30], center_mm: [0, 0, 90], elements: 900}
-  camera: {width: 480, height: 270, focal_px: 350, baseline_mm: 5, fps: 10}
-  gesture:
-    - {approach_s: 0.5, at_px: [240, 135]}
-    - {grasp: true}
-    - {move_mm: [2, 0, 0], during_s: 0.4}
-    - {hold_s: 0.2}
-    - {release: true, leave_s: 0.2}
-TEXT
+cp "$(dirname "$0")/../app/slab.yaml" "$work/slab.yaml"
 cat >"$work/study.yaml" <<TEXT
 title: Twenty runs
 experiments:
   - name: modulus
     scene: slab.yaml
     sweep: {key: tissue.young_modulus_kPa, unit: kPa, logarithmic: true, times: {from: 1, to: 100, steps: 10}}
-  - name: thickness
+  - name: footprint
     scene: slab.yaml
-    sweep: {key: map.thickness_mm, unit: mm, times: {from: 0.8, to: 1.2, steps: 10}}
+    sweep: {key: contact.footprint_radius_mm, unit: mm, times: {from: 0.8, to: 1.2, steps: 10}}
 TEXT
 "$program" study "$work/study.yaml" -o "$work/local" >"$work/local.log" 2>&1
 "$program" study "$work/study.yaml" --export snakemake -o "$work/cluster" >"$work/export.log" 2>&1

@@ -315,6 +315,12 @@ TEST_F(CalibrationFile, GoesOnWithTheSameMessageWhereATopicWasEchoed) {
   expect_the_pair("echo.yaml", "header: {seq: 1}\n" + message + "---\nheader: {seq: 2}\n" + message + "---\n");
 }
 
+TEST_F(CalibrationFile, ThatClosesABraceTooOftenIsRefused) {
+  EXPECT_THAT(
+      refusal("twice.json", fmt::format("{{\"M1\":[{}]}},\"rms\":0.2,\"size\":{{\"width\":640}}}}\n", list(kK1))),
+      AllOf(HasSubstr("twice.json"), HasSubstr("a bracket too many?")));
+}
+
 TEST_F(CalibrationFile, ThatIsNotUnderstoodNamesItsKeysAndTheNearest) {
   std::string text = file_storage("camra_matrix_left", "D1", "M2", "D2");
   EXPECT_THAT(refusal("c.yaml", text), AllOf(HasSubstr("no camera matrix of the left camera"),
