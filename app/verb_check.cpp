@@ -10,6 +10,7 @@
 #include "app/run.h"
 #include "app/track_check.h"
 #include "app/verbs.h"
+#include "palpate/instrument/instrument_finder.h"
 #include "palpate/session/output_folder.h"
 
 namespace palpate::app {
@@ -83,6 +84,8 @@ void add_check(CLI::App& app) {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     if (!arguments->folder.empty()) require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
+    // A network that cannot run is said here, not after the map of a run.
+    const InstrumentFinder finder(scene_file.scene.instrument, built.frame.left, built.map.organ_mask);
     std::optional<TrackCheck> track;
     if (const InstrumentOptions& instrument = scene_file.scene.instrument;
         !instrument.track.empty() && !instrument.has_live_track() && !built.timing.is_live)

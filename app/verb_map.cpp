@@ -9,6 +9,7 @@
 #include "palpate/feedback/map_json.h"
 #include "palpate/session/clear_results.h"
 #include "palpate/session/output_folder.h"
+#include "palpate/session/root_folder.h"
 
 namespace palpate::app {
 
@@ -29,7 +30,7 @@ void add_map(CLI::App& app) {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     require_output_folder(arguments->folder);
     const BuiltMap built = build_map(scene_file, arguments->json);
-    begin_results(arguments->folder);
+    begin_results(arguments->folder, sources_of(scene_file));
     write_map_files(built, arguments->folder);
     if (arguments->json) {
       auto json = nlohmann::ordered_json::parse(map_json(built.map, built.rectification));

@@ -53,10 +53,4 @@ Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F) {
   return law == Law::linear ? P : Mat3(P * F.transpose() / F.determinant());
 }
 
-double von_mises(const Mat3& s) {
-  const double xy = s(0, 0) - s(1, 1), yz = s(1, 1) - s(2, 2), zx = s(2, 2) - s(0, 0);
-  const double shear = s(0, 1) * s(0, 1) + s(1, 2) * s(1, 2) + s(2, 0) * s(2, 0);
-  return std::sqrt(0.5 * (xy * xy + yz * yz + zx * zx + 6 * shear));
-}
-
 }  // namespace palpate

@@ -47,7 +47,7 @@ std::string law_name(Law law);
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-/// Lame's constants, MPa.
+/// Lame parameters, MPa.
 struct Lame {
   double lambda = 0;
   double mu = 0;
@@ -64,7 +64,7 @@ Lame lame_of(const TissueOptions& tissue, int label);
 ///   neo-hookean:            mu/2 (J^-2/3 tr(F^T F) - 3) + kappa/2 (J - 1)^2, kappa = lambda + 2/3 mu (Abaqus,
 ///   CalculiX)
 ///   corotated:              lambda/2 tr(S - I)^2 + mu |S - I|^2 with F = R S, R a rotation also where F is inverted
-///   (Mueller and Gross 2004; with tr(S - I)^2, not (J - 1)^2, so that it is Hooke's law in the turned frame)
+///   (Mueller and Gross 2004; with tr(S - I)^2, not (J - 1)^2, so that it is Hooke's law in the rotated frame)
 ///   linear:                 lambda/2 tr(eps)^2 + mu eps:eps, eps = sym(F) - I
 double energy_density(Law law, const Lame& lame, const Mat3& F);
 
@@ -97,8 +97,5 @@ bool resists_inversion(Law law);
 
 /// P F^T / J, MPa; of the linear law, which does not tell the two states apart, P.
 Mat3 cauchy_stress(Law law, const Lame& lame, const Mat3& F);
-
-/// Eq. 5 of the paper.
-double von_mises(const Mat3& stress);
 
 }  // namespace palpate

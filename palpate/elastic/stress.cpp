@@ -1,11 +1,18 @@
 #include "palpate/elastic/stress.h"
 
 #include <Eigen/LU>
+#include <cmath>
 
 namespace palpate {
 
 namespace {
 constexpr double kKiloPascalPerMegaPascal = 1e3;
+}
+
+double von_mises(const Mat3& s) {
+  const double xy = s(0, 0) - s(1, 1), yz = s(1, 1) - s(2, 2), zx = s(2, 2) - s(0, 0);
+  const double shear = s(0, 1) * s(0, 1) + s(1, 2) * s(1, 2) + s(2, 0) * s(2, 0);
+  return std::sqrt(0.5 * (xy * xy + yz * yz + zx * zx + 6 * shear));
 }
 
 std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u) {

@@ -4,7 +4,10 @@
 
 namespace palpate {
 
-/// Von Mises of the Cauchy stress (Eq. 5), one per element, kPa.
+/// Eq. 5 of the paper.
+double von_mises(const Mat3& stress);
+
+/// Von Mises of the Cauchy stress, one per element, kPa.
 std::vector<double> element_von_mises_kPa(const TetModel& model, const Eigen::VectorXd& u);
 
 /// Mean over the elements around each node, weighted by their deformed volume, kPa. Elements that are turned inside out

@@ -87,7 +87,7 @@ class TetModel {
   void build_pattern();
   void build_order();
   int position(int row, int column) const;
-  /// kappa (theta - 1) of every star, MPa; empty for Element::linear.
+  /// kappa (theta - 1) of every nodal patch, MPa; empty for Element::linear.
   Eigen::VectorXd patch_pressure_MPa(const Eigen::VectorXd& u) const;
   template <class L>
   void add_element_forces(const Eigen::VectorXd& u, const Eigen::VectorXd& pressure, Eigen::VectorXd& force) const;

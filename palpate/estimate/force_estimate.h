@@ -7,7 +7,7 @@
 #include "palpate/infer/band.h"
 #include "palpate/infer/contact_tangent.h"
 #include "palpate/infer/correlation.h"
-#include "palpate/infer/hypotheses.h"
+#include "palpate/infer/hold_filter.h"
 
 namespace palpate {
 

@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// Content of map.json: counts, times, coverage, quality of the mesh, tissue, and the turn between the left camera
+/// Content of map.json: counts, times, coverage, quality of the mesh, tissue, and the rotation between the left camera
 /// frame and the rectified one.
 std::string map_json(const TissueMap& map, const Rectification& rectification);
 

@@ -3,25 +3,10 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "palpate/core/geometry.h"
 #include "palpate/infer/inference_parameters.h"
+#include "palpate/infer/scene_motion.h"
 
 namespace palpate {
-
-/// Motion of the scene since the map frame: x = about + translation + exp(rotation) (1 + strain) (y - about). What
-/// holds the tissue stretches as it breathes.
-struct SceneMotion {
-  Vec3 translation_mm = Vec3::Zero();
-  Vec3 rotation_rad = Vec3::Zero();
-  Vec3 about_mm = Vec3::Zero();
-  Vec3 strain = Vec3::Zero();  ///< xx, yy, xy of the left camera frame
-
-  Mat3 rotation() const;
-  /// exp(rotation) (1 + strain).
-  Mat3 linear() const;
-  Vec3 apply(const Vec3& in_map_mm) const;
-  Vec3 undo(const Vec3& now_mm) const;
-};
 
 /// Where each unknown of the estimate stands in its vector: the scene's translation, rotation and strain and the
 /// stereo's common disparity bias, then for each contact q, offset, log radius and skew (common error of the model's

@@ -7,7 +7,7 @@ namespace palpate {
 struct Belief;
 struct ForceAt;
 
-/// How much of what is not known of a frame's force comes from each unknown that nobody asked for: multiple correlation
+/// How much of what is not known of a frame's force comes from each nuisance unknown: multiple correlation
 /// of the force along its own direction with the unknowns of each kind, 0 (nothing) to 1 (all of it).
 struct ForceCorrelation {
   double scene_motion = 0;

@@ -49,19 +49,15 @@ double FilterState::stated_log_radius() const {
   return std::log(options.footprint_radius_mm);
 }
 
-std::vector<PatchReach> FilterState::reaches(const Belief& prior) const {
+std::vector<PatchReach> FilterState::reaches() const {
   std::vector<PatchReach> result;
-  for (size_t k = 0; k < model.contact_count(); ++k) {
-    const Eigen::Index at = Unknowns::log_radius(k);
-    const double deviation = std::min(parameters.log_radius, std::sqrt(prior.covariance(at, at)));
-    const double radius_mm = model.radius_mm(k);
-    result.push_back({model.footprint(k).center_mm, radius_mm, radius_mm * std::exp(-deviation)});
-  }
+  for (size_t k = 0; k < model.contact_count(); ++k)
+    result.push_back({model.footprint(k).center_mm, model.radius_mm(k)});
   return result;
 }
 
 double FilterState::excluded_mm(size_t contact) const {
-  return parameters.excluded_radii * (contact < patches.size() ? patches[contact].rim_mm : model.radius_mm(contact));
+  return parameters.excluded_radii * model.radius_mm(contact);
 }
 
 std::vector<TissuePoint> FilterState::usable(const std::vector<TissuePoint>& seen) const {

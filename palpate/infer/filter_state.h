@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "palpate/contact/detect.h"
+#include "palpate/contact/gap.h"
 #include "palpate/infer/contact_fit.h"
 #include "palpate/infer/force_filter.h"
 
@@ -22,9 +22,10 @@ struct Hand {
   bool is_confirmed = true;  ///< the tissue of a later frame has said that it holds
   bool is_told = false;      ///< the operator says where it holds; there is no tip
   double onset_s = 0;
-  int frames_expected = 0;           ///< until a touch elsewhere may be expected
-  SceneMotion free_scene;            ///< while a contact is kept that is more probably none
-  Vec3 slid_from_mm = Vec3::Zero();  ///< the offset with which the patch was laid
+  int frames_expected = 0;            ///< until a touch elsewhere may be expected
+  SceneMotion free_scene;             ///< while a contact is kept that is more probably none
+  Vec3 slid_from_mm = Vec3::Zero();   ///< the offset with which the patch was laid
+  Vec3 learned_at_mm = Vec3::Zero();  ///< q of the last frame that told the radius
 };
 
 /// A frame's answer from which radius and place of these instruments' patches are to be laid anew.
@@ -64,8 +65,8 @@ struct FilterState {
   /// Where the tip stands against the patch is told by the tissue that rests as yet, whatever drives later.
   FitContext context() const;
   double stated_log_radius() const;
-  /// Where the model is believed to be right, as of `prior`.
-  std::vector<PatchReach> reaches(const Belief& prior) const;
+  /// The patches as they are laid.
+  std::vector<PatchReach> reaches() const;
   /// Tissue nearer to a patch than this moves with it, whatever the model says.
   double excluded_mm(size_t contact) const;
   /// The points on the body that no patch's rim disturbs; the same for every hypothesis of the frame.

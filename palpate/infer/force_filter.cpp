@@ -65,7 +65,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
   for (Hand& hand : s.hands)
     if (hand.contact) hand.filter.predict(seconds, s.parameters);
 
-  s.patches = s.reaches(prior);
+  s.patches = s.reaches();
   FrameData data;
   data.tissue = s.usable(frame.tissue);
   data.seconds = seconds;

@@ -11,6 +11,7 @@
 #include "palpate/infer/belief.h"
 #include "palpate/infer/contact_tangent.h"
 #include "palpate/infer/correlation.h"
+#include "palpate/infer/hold_filter.h"
 #include "palpate/infer/hypotheses.h"
 #include "palpate/instrument/instrument_tracker.h"
 #include "palpate/observe/tissue_tracker.h"
@@ -22,7 +23,7 @@ struct FrameEvidence {
   double time_s = 0;
   std::vector<TissuePoint> tissue;
   std::vector<TipObservation> tips;  ///< of each instrument
-  bool may_touch = true;             ///< the picture is new and lies behind the map frame
+  bool may_touch = true;             ///< the picture is new and comes after the map frame
   /// Where the first instrument, which is not looked for, may hold the tissue: place at rest; empty = nowhere.
   std::optional<Vec3> held_at_mm;
   bool held_for_sure = false;  ///< it does hold it, from this frame on

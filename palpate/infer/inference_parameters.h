@@ -10,11 +10,11 @@ struct InferenceParameters {
   double point_px = 0.07;        ///< deviation of a tracked point in one camera, px
   double point_dof = 4;          ///< Student-t degrees of freedom of a point
   double effective_points = 25;  ///< effective sample size: more points share their errors with neighbours
-  double motion_error = 0.08;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
+  double motion_error = 0.16;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
   double tip_floor_mm = 0.05;    ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip
-  double excluded_radii = 1.2;     ///< points nearer to a patch than so many radii are left out
+  double excluded_radii = 1;       ///< points nearer to a patch than so many of its radii are left out
 
   // What is not known beforehand: one standard deviation.
   double scene_mm = 15, scene_rad = 0.1;                  ///< rigid motion of the scene since the map
@@ -32,6 +32,7 @@ struct InferenceParameters {
   double skew = 0.03;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
+  double new_pose = 0.1;                                ///< and q has changed by this ratio of itself since
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.
   double touch_per_s = 0.5;    ///< a free tip begins to touch

@@ -20,11 +20,10 @@ struct SurfacePlace {
 std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, const std::vector<Vec3>& nodes_mm,
                                     const std::vector<Triangle>& boundary);
 
-/// How near to a patch the model of its motion is right.
+/// Where a patch is laid, for the model's error around it.
 struct PatchReach {
   Vec3 center_mm = Vec3::Zero();  ///< at rest
   double radius_mm = 0;           ///< of the patch
-  double rim_mm = 0;              ///< the smallest that is likely
 };
 
 /// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.

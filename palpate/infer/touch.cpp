@@ -76,6 +76,7 @@ void FilterState::begin(size_t instrument, const TipObservation& tip, const Gap&
   const ContactFit fit = fit_linear(belief, data, *body, model, context());
   belief = fit.kept;
   hand.slid_from_mm = belief.offset_mm(*hand.contact);
+  hand.learned_at_mm = Vec3::Zero();
 }
 
 void FilterState::look_for_touch(size_t instrument, const FrameEvidence& frame, double seconds,

@@ -30,7 +30,13 @@ void begin(const std::filesystem::path& folder, const Names& names, const std::f
 
 }  // namespace
 
-void begin_results(const std::filesystem::path& folder) {
+void begin_results(const std::filesystem::path& folder, const std::vector<std::string>& sources) {
+  std::error_code ignored;
+  for (const char* name : kResults)
+    for (const std::string& source : sources)
+      if (std::filesystem::equivalent(folder / name, source, ignored))
+        throw BadInput(fmt::format("results in {} would replace {}, which the scene reads; expected another folder",
+                                   folder.string(), source));
   begin(folder, kResults, {});
 }
 

@@ -6,6 +6,7 @@
 #include "palpate/session/clear_results.h"
 #include "palpate/session/in_scene.h"
 #include "palpate/session/playback.h"
+#include "palpate/session/root_folder.h"
 #include "palpate/session/shape.h"
 #include "palpate/stream/stream_hub.h"
 
@@ -47,7 +48,7 @@ struct Run::State {
         recording(live ? std::move(live) : std::make_shared<Recording>(s.scene.recording)),
         playback(*recording, options.realtime, options.stopped) {
     recording->count_anew();
-    begin_results(folder);
+    begin_results(folder, sources_of(scene_file));
     files.emplace(s, folder, built, *recording, std::move(truths), streams);
     files->losses.attempt([&] { write_map_files(built, folder); });
     keep_shape([&] { shapes.emplace(folder / "shapes.bin", built); });

@@ -42,6 +42,25 @@ TEST_F(BadInput, AMissingVideoIsNamed) {
   EXPECT_THAT(complaint(), HasSubstr("right.avi"));
 }
 
+TEST_F(BadInput, ResultsDoNotReplaceWhatTheSceneReads) {
+  const std::string map = "map " + in("scene.yaml").string() + " -o " + (workspace_ / "").string();
+  ASSERT_EQ(run_palpate(map + "in").exit_code, 0);
+  const std::string body = read_file(in("map.vtu"));
+  spoil_scene("thickness_mm: 15", "volume: map.vtu");
+  const Outcome outcome = run_palpate(map + "in");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.error, AllOf(HasSubstr("in/map.vtu"), HasSubstr("expected another folder")));
+  EXPECT_EQ(read_file(in("map.vtu")), body);
+  EXPECT_EQ(run_palpate(map + "elsewhere").exit_code, 0);
+}
+
+TEST_F(BadInput, CheckSaysThatANetworkIsMissingBeforeAnythingRuns) {
+  spoil_scene("segmentation: colour", "segmentation: mine.onnx");
+  const Outcome outcome = run_palpate("check " + in("scene.yaml").string());
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.error, HasSubstr("mine.onnx"));
+}
+
 TEST_F(BadInput, AnEmptyVideoIsNamed) {
   write_file(in("left.avi"), "");
   EXPECT_THAT(complaint(), HasSubstr("left.avi"));

@@ -4,7 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "palpate/contact/detect.h"
+#include "palpate/contact/gap.h"
 #include "tests/support/meshes.h"
 
 namespace palpate {

@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "palpate/elastic/stress.h"
+
 namespace palpate {
 namespace {
 

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "palpate/infer/hold_filter.h"
+
 namespace palpate {
 namespace {
 

@@ -55,7 +55,7 @@ TEST(Measurement, TheModelErrsByARatioOfWhatAHalfSpaceWouldDo) {
   const InferenceParameters parameters;
   ContactResponse response;
   const std::vector<SurfacePlace> places(1);
-  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3, 2.5}};
+  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3}};
   Eigen::VectorXd x0 = Eigen::VectorXd::Zero(Unknowns::count(1));
   x0.segment<3>(Unknowns::q(0)) << 0, 3, 4;
   const PredictedBody body{&response, &places, x0, Vec3::Zero(), &patches};

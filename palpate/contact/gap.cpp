@@ -1,4 +1,4 @@
-#include "palpate/contact/detect.h"
+#include "palpate/contact/gap.h"
 
 #include <Eigen/Geometry>
 #include <stdexcept>
