@@ -26,15 +26,21 @@ Rectification da_vinci() {
   return r;
 }
 
-AttachedMesh slab(const std::vector<Vec3>& places_mm) {
-  TetMesh mesh = test::box_mesh({60, 60, 20}, {10, 10, 4});
-  const std::vector<int> fixed_before = test::nodes_at(mesh, 2, 20);
+AttachedMesh slab_of(double thickness_mm, const std::vector<Vec3>& places_mm) {
+  TetMesh mesh = test::box_mesh({60, 60, thickness_mm}, {10, 10, 4});
   for (Vec3& node : mesh.nodes_mm) node += kDepth_mm;
   for (const Vec3& place_mm : places_mm) mesh = refine_near(mesh, place_mm, 6, 3);
   std::vector<int> fixed;
   for (size_t i = 0; i < mesh.nodes_mm.size(); ++i)
-    if (mesh.nodes_mm[i].z() > kDepth_mm.z() + 19.99) fixed.push_back(static_cast<int>(i));
+    if (mesh.nodes_mm[i].z() > kDepth_mm.z() + thickness_mm - 0.01) fixed.push_back(static_cast<int>(i));
   return {std::move(mesh), fixed};
+}
+
+AttachedMesh slab(const std::vector<Vec3>& places_mm) {
+  return slab_of(20, places_mm);
+}
+AttachedMesh thin_slab(const std::vector<Vec3>& places_mm) {
+  return slab_of(16, places_mm);
 }
 
 std::vector<TissuePoint> grid_of_points() {
@@ -166,6 +172,20 @@ TEST(ForceFilter, ARadiusToldAtHalfOrTwiceHarmsItLessThanHalfAsMuchAsTheTipAlone
     EXPECT_GT(tip_run.last_error_N, 0.3 * run.peak_N) << ratio;
     EXPECT_LT(run.last_error_N, 0.5 * tip_run.last_error_N) << ratio;
   }
+}
+
+TEST(ForceFilter, AHandThatHoldsStillTeachesTheRadiusNothingMore) {
+  Made made;
+  ContactOptions contact;
+  contact.footprint_radius_mm = kTrueRadius_mm;
+  contact.grip = Grip::grasp;
+  ForceFilter filter(ContactModel(thin_slab, kTissue, Element::averaged), thin_slab({}), made.points(), da_vinci(),
+                     contact);
+  pull(made, filter, 0);
+  std::vector<double> radii_mm;
+  for (int i = 31; i < 71; ++i)
+    radii_mm.push_back(filter.update(made.frame(i, Vec3(0.6, 0, -3), Vec3::Zero(), true)).instruments[0].footprint_mm);
+  EXPECT_NEAR(radii_mm.back() / radii_mm.front(), 1, 0.03);
 }
 
 TEST(ForceFilter, AScenesMotionIsNoForce) {
