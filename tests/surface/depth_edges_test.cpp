@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/surface/cocone.h"
 #include "palpate/surface/cut_surface.h"
+#include "palpate/surface/extend_rim.h"
 #include "palpate/surface/seen_tissue.h"
 #include "tests/surface/seen_surface.h"
 
@@ -41,6 +43,28 @@ TEST(DepthEdges, OrgansCreasesAndSlopesHaveNone) {
   EXPECT_EQ(cells_on_edges(edges_of(roof, noisy(0.3))), 0);
   const auto slope = height_field([](double x, double) { return 95 + 1.5 * x; });
   EXPECT_EQ(cells_on_edges(edges_of(slope, noisy(0.3))), 0);
+}
+
+TEST(DepthEdges, KeepARimFromBeingDrawnOverAGapToWhatIsMeasuredBeyond) {
+  constexpr double kGap_mm = 6;
+  const auto depth_mm = [](double x, double y) { return 90 + 0.01 * (x * x + y * y); };
+  const auto two_organs =
+      height_field([&](double x, double y) { return depth_mm(x, y) + (x > 0 && x < kGap_mm ? 30 : 0); });
+  const DepthEdges edges = edges_of(two_organs, noisy(0.2));
+  std::vector<Vec3> coarse, measured;
+  for (double y = -12; y <= 12; y += 0.5)
+    for (double x = -15; x <= 15; x += 0.5)
+      if (x <= 0 || x >= kGap_mm) measured.emplace_back(x, y, depth_mm(x, y));
+  for (double y = -12; y <= 12; y += 3)
+    for (double x = -15; x < 0; x += 3) coarse.emplace_back(x, y, depth_mm(x, y));
+  const Surface thinned = cocone(coarse, {});
+  const auto farthest_mm = [](const Surface& surface) {
+    double x = -1e9;
+    for (const Vec3& vertex : surface.vertices_mm) x = std::max(x, vertex.x());
+    return x;
+  };
+  ASSERT_GT(farthest_mm(extend_rim(thinned, measured, 12)), kGap_mm) << "nothing keeps it without edges";
+  EXPECT_LT(farthest_mm(extend_rim(thinned, measured, 12, &edges)), 2);
 }
 
 TEST(DepthEdges, PartABallFromTheWallWithinAMillimetre) {
