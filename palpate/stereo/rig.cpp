@@ -15,6 +15,9 @@ std::string how_they_may_fit(cv::Size calibrated, cv::Size video) {
   const double scale = static_cast<double>(video.width) / calibrated.width;
   if (std::abs(scale * calibrated.height - video.height) <= 1)
     return fmt::format("; if they were scaled after the calibration, say recording.scale: {:.6g}", scale);
+  const double turned_scale = static_cast<double>(video.height) / calibrated.width;
+  if (std::abs(turned_scale * calibrated.height - video.width) <= 1)
+    return "; the pictures are turned by 90 degrees against the calibration, expected them as they were calibrated";
   return "; if they were cut out of larger ones after the calibration, say where by recording.crop: [x, y, width, "
          "height]";
 }

@@ -391,6 +391,7 @@ TEST_F(CalibrationFile, HoldsForPicturesThatWereCutAndScaledAfterwards) {
   sized.image_size = {640, 480};
   EXPECT_THAT(sentence_of([&] { cut_and_scaled(sized, {300, 40, 400, 300}, 1); }), HasSubstr("recording.crop"));
   EXPECT_THAT(sentence_of([&] { check_rig_fits(sized, {320, 240}); }), HasSubstr("recording.scale: 0.5"));
+  EXPECT_THAT(sentence_of([&] { check_rig_fits(sized, {480, 640}); }), HasSubstr("turned by 90 degrees"));
 }
 
 TEST(Rectification, OfAFisheyePairLeadsPixelsBackToWhereOpenCvProjectsThem) {
