@@ -164,7 +164,10 @@ std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path
   std::error_code ignored;
   if (has_placeholder(path) && !std::filesystem::exists(path, ignored)) {
     std::vector<NumberedFile> files = files_of_pattern(path);
-    if (files.empty()) throw BadInput(fmt::format("{}: no image is named like {}", key, name));
+    if (files.empty())
+      throw BadInput(fmt::format(
+          "{}: no image is named like {}{}", key, name,
+          std::count(name.begin(), name.end(), '%') > 1 ? "; a percent sign that begins no number is written %%" : ""));
     return std::make_unique<ImageFiles>(std::move(files), key, fps);
   }
   if (const std::string obstacle = obstacle_to_reading(path); !obstacle.empty())

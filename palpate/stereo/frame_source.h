@@ -43,7 +43,8 @@ std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path
 std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key);
 
 /// Images of a pattern such as left_%04d.png or %04d/left.png, by rising number, gaps allowed; empty where the path
-/// holds no placeholder. `%%` is a percent sign.
+/// holds no placeholder. `%%` is a percent sign; so is a `%` that looks like a placeholder where images are found so
+/// only.
 struct NumberedFile {
   long long number = 0;
   std::filesystem::path file;

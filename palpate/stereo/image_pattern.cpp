@@ -10,35 +10,42 @@ namespace palpate {
 
 namespace {
 
-const std::regex& placeholder() {
-  static const std::regex kPlaceholder("%(0?)([0-9]{0,2})[diu]");
-  return kPlaceholder;
+/// "%04d", or "%%", which is a percent sign.
+const std::regex& conversion() {
+  static const std::regex kConversion("%%|%0?([0-9]{0,2})[diu]");
+  return kConversion;
 }
 
-std::string without_doubled_percent(const std::string& text) {
-  return std::regex_replace(text, std::regex("%%"), "%");
+std::vector<std::smatch> placeholders_of(const std::string& text) {
+  std::vector<std::smatch> found;
+  for (std::sregex_iterator next(text.begin(), text.end(), conversion()), end; next != end; ++next)
+    if (next->str() != "%%") found.push_back(*next);
+  return found;
 }
 
-/// "%04d" replaced by the number.
+size_t width_of(const std::smatch& placeholder) {
+  return placeholder[1].length() > 0 ? std::stoul(placeholder[1]) : 0;
+}
+
+/// "%04d" replaced by the number, "%%" by a percent sign.
 std::string with_number(const std::string& text, long long number) {
-  std::string result = text;
-  std::smatch found;
-  while (std::regex_search(result, found, placeholder())) {
-    const size_t width = found[2].length() ? std::stoul(found[2]) : 0;
-    std::string digits = std::to_string(number);
-    if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
-    result = found.prefix().str() + digits + found.suffix().str();
+  std::string result;
+  auto rest = text.begin();
+  for (std::sregex_iterator next(text.begin(), text.end(), conversion()), end; next != end; ++next) {
+    result.append(rest, (*next)[0].first);
+    std::string shown = next->str() == "%%" ? "%" : std::to_string(number);
+    if (const size_t width = width_of(*next); shown.size() < width) shown.insert(0, width - shown.size(), '0');
+    result += shown;
+    rest = (*next)[0].second;
   }
-  return without_doubled_percent(result);
+  return result.append(rest, text.end());
 }
 
-}  // namespace
-
-bool has_placeholder(const std::filesystem::path& pattern) {
-  return std::regex_search(pattern.string(), placeholder());
+std::string without_number(const std::string& text) {
+  return with_number(text, 0);
 }
 
-std::vector<NumberedFile> files_of_pattern(const std::filesystem::path& pattern) {
+std::vector<NumberedFile> files_named_like(const std::filesystem::path& pattern) {
   std::filesystem::path folder, rest;
   std::string numbered;
   for (const std::filesystem::path& part : pattern) {
@@ -47,12 +54,13 @@ std::vector<NumberedFile> files_of_pattern(const std::filesystem::path& pattern)
     else if (has_placeholder(part))
       numbered = part.string();
     else
-      folder /= without_doubled_percent(part.string());
+      folder /= without_number(part.string());
   }
-  std::smatch found;
-  if (!std::regex_search(numbered, found, placeholder())) return {};
-  const std::string before = without_doubled_percent(found.prefix()), after = found.suffix();
-  const size_t width = found[2].length() ? std::stoul(found[2]) : 1;
+  const std::vector<std::smatch> found = placeholders_of(numbered);
+  if (found.empty()) return {};
+  const std::string before = without_number({numbered.cbegin(), found[0][0].first});
+  const std::string after(found[0][0].second, numbered.cend());
+  const size_t width = std::max<size_t>(1, width_of(found[0]));
   std::vector<NumberedFile> files;
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, ignored)) {
@@ -70,6 +78,28 @@ std::vector<NumberedFile> files_of_pattern(const std::filesystem::path& pattern)
   }
   std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
   return files;
+}
+
+}  // namespace
+
+bool has_placeholder(const std::filesystem::path& pattern) {
+  return !placeholders_of(pattern.string()).empty();
+}
+
+std::vector<NumberedFile> files_of_pattern(const std::filesystem::path& pattern) {
+  const std::string text = pattern.string();
+  const std::vector<std::smatch> found = placeholders_of(text);
+  // What looks like a number may be meant as it stands: 100%done/left_%02d.png.
+  constexpr size_t kMost = 4;
+  const unsigned readings = 1U << std::min(found.size(), kMost);
+  for (unsigned as_it_stands = 0; as_it_stands + 1 < readings; ++as_it_stands) {
+    std::string reading = text;
+    for (size_t i = std::min(found.size(), kMost); i-- > 0;)
+      if ((as_it_stands >> i & 1U) != 0) reading.insert(static_cast<size_t>(found[i].position()), "%");
+    std::vector<NumberedFile> files = files_named_like(reading);
+    if (!files.empty()) return files;
+  }
+  return {};
 }
 
 }  // namespace palpate

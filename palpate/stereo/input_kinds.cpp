@@ -90,7 +90,7 @@ std::vector<InputKind> recording_kinds() {
       {"numbered images", "KITTI, Hamlyn, SCARED, EuRoC, Blender",
        "`left_%04d.png`, `image01/%010d.jpg`, `%04d/left.png`; gaps are gaps; times from times.txt, timestamps.txt or "
        "data.csv beside the images or one folder above; numbers that are ns, us or ms since 1970 are stamps; 8, 10, 12 "
-       "or 16 bits; a name that is there as it stands is a file"},
+       "or 16 bits; a name that is there as it stands is a file, `%%` is a percent sign"},
       {"both cameras in one picture", "da Vinci, 3D recorders", "`stereo` with `layout: side-by-side` or `top-bottom`"},
       {"interlaced pictures", "3D recorders, HD-SDI", "said; `deinterlace: true` keeps the even rows"},
       {"live", "V4L2, DeckLink, RTSP and RTP, whatever GStreamer reads",

@@ -2,42 +2,24 @@
 
 #include <fmt/core.h>
 
-#include <cstdlib>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
-#include "tests/stereo/files.h"
+#include "tests/stereo/small_recordings.h"
 
 namespace palpate {
 namespace {
 
+using test::camera;
+using test::kLeftLevel;
+using test::kRightLevel;
+using test::pairs_and_times;
+using test::picture;
 using test::sentence_of;
 using test::TemporaryFolder;
+using test::write_video;
 using testing::AllOf;
 using testing::HasSubstr;
 using namespace std::string_literals;
-
-constexpr int kLeftLevel = 60, kRightLevel = 180;
-
-// A grey image whose level tells the camera and whose bright bar tells the frame.
-cv::Mat picture(cv::Size size, int level, int frame) {
-  cv::Mat image(size, CV_8UC3, cv::Scalar::all(level));
-  image(cv::Rect(0, 4 * (frame % 10), size.width, 4)) = cv::Scalar::all(250);
-  return image;
-}
-
-void write_video(const std::filesystem::path& file, const std::vector<cv::Mat>& images, double fps = 25) {
-  cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), fps, images.front().size());
-  ASSERT_TRUE(writer.isOpened());
-  for (const cv::Mat& image : images) writer.write(image);
-}
-
-std::vector<cv::Mat> camera(int level, int frames, cv::Size size = {64, 48}) {
-  std::vector<cv::Mat> images;
-  for (int i = 0; i < frames; ++i) images.push_back(picture(size, level, i));
-  return images;
-}
 
 std::vector<cv::Mat> both_cameras(int frames, StereoLayout layout) {
   std::vector<cv::Mat> images;
@@ -116,18 +98,6 @@ TEST(Recording, ReadsNumberedImagesFromAnyFirstNumber) {
   expect_all(options, 3);
 }
 
-/// Which of the frames have a right image: "1101", and their times in frames: "0,1,3".
-std::pair<std::string, std::string> pairs_and_times(const RecordingOptions& options) {
-  Recording recording(options);
-  std::string pairs, times;
-  while (const auto frame = recording.next()) {
-    pairs += frame->right.empty() ? '0' : '1';
-    times += fmt::format("{}{:.4g}", times.empty() ? "" : ",", frame->time_s * 25);
-    EXPECT_EQ(frame->index + 1, static_cast<int>(pairs.size()));
-  }
-  return {pairs, times};
-}
-
 TEST(Recording, TakesNumbersOfImagesAsTheirTime) {
   const TemporaryFolder folder;
   const auto write = [&](const std::string& name) {
@@ -199,19 +169,6 @@ TEST(Recording, TakesTheTimesOfImagesFromAFileBesideThem) {
   EXPECT_EQ(pairs_and_times(options).second, "0,1,2,3");
 }
 
-TEST(Recording, OpensNamesWithAPercentSign) {
-  const TemporaryFolder folder;
-  RecordingOptions options;
-  options.left = folder / "left%20dull.png";
-  options.right = folder / "right%20dull.png";
-  for (const auto& path : {options.left, options.right}) cv::imwrite(path.string(), picture({64, 48}, kLeftLevel, 0));
-  EXPECT_EQ(pairs_and_times(options).first, "1");
-  options.left = folder / "20%_left.avi";
-  options.right = folder / "20%_right.avi";
-  for (const auto& path : {options.left, options.right}) write_video(path, camera(kLeftLevel, 2));
-  EXPECT_EQ(pairs_and_times(options).first, "11");
-}
-
 TEST(Recording, ShowsTwelveBitsInSixteenAndGreyImages) {
   const TemporaryFolder folder;
   RecordingOptions options;
@@ -223,65 +180,6 @@ TEST(Recording, ShowsTwelveBitsInSixteenAndGreyImages) {
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->left.at<cv::Vec3b>(5, 5), cv::Vec3b::all(255));
   EXPECT_EQ(frame->right.at<cv::Vec3b>(5, 5), cv::Vec3b::all(100));
-}
-
-/// Frames of the left and right video at these multiples of 40 ms, by FFmpeg's own program.
-class MadeByFfmpeg : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (std::system("ffmpeg -version >/dev/null 2>&1") != 0) GTEST_SKIP() << "the program ffmpeg is not installed";
-    write_video(folder_ / "left.avi", camera(kLeftLevel, 10));
-    write_video(folder_ / "right.avi", camera(kRightLevel, 10));
-  }
-  void make(const std::string& from, const std::string& options, const std::string& to,
-            const std::string& of_input = "") const {
-    const std::string command = fmt::format("ffmpeg -v error -y {} -i '{}' {} '{}'", of_input,
-                                            (folder_ / from).string(), options, (folder_ / to).string());
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
-  }
-  RecordingOptions options(const std::string& left, const std::string& right) const {
-    RecordingOptions result;
-    result.left = folder_ / left;
-    result.right = folder_ / right;
-    return result;
-  }
-  TemporaryFolder folder_;
-};
-
-TEST_F(MadeByFfmpeg, FramesHaveTheTimeAtWhichTheyAreShown) {
-  for (const char* side : {"left", "right"}) {
-    const std::string from = fmt::format("{}.avi", side);
-    // Frames 3 and 4 are dropped: the rate varies.
-    make(from, "-vf \"select='not(between(n,3,4))'\" -vsync vfr -c:v mpeg4", fmt::format("{}_vfr.mp4", side));
-    make(from, "-c:v mpeg4 -g 20", fmt::format("{}_whole.mp4", side));
-    // The key frame of the cut lies before it; an edit list hides what comes before.
-    make(fmt::format("{}_whole.mp4", side), "-c copy", fmt::format("{}_cut.mp4", side), "-ss 0.2");
-    make(from, "-c:v mpeg2video -q:v 2", fmt::format("{}.ts", side));  // starts at 1.4 s
-    make(from, "-c:v mpeg4", fmt::format("{}.mkv", side));
-  }
-  EXPECT_EQ(pairs_and_times(options("left_vfr.mp4", "right_vfr.mp4")), std::pair("11111111"s, "0,1,2,5,6,7,8,9"s));
-  EXPECT_EQ(pairs_and_times(options("left_cut.mp4", "right_cut.mp4")), std::pair("11111"s, "0,1,2,3,4"s));
-  EXPECT_EQ(Recording(options("left_cut.mp4", "right_cut.mp4")).frame_count(), 5);
-  EXPECT_EQ(pairs_and_times(options("left.ts", "right.ts")), std::pair("1111111111"s, "0,1,2,3,4,5,6,7,8,9"s));
-  EXPECT_EQ(pairs_and_times(options("left.mkv", "right.mkv")), std::pair("1111111111"s, "0,1,2,3,4,5,6,7,8,9"s));
-  EXPECT_EQ(pairs_and_times(options("left.ts", "right.mkv")).first, "1111111111");
-}
-
-TEST_F(MadeByFfmpeg, LeftAndRightArePairedByTheirTime) {
-  make("left.avi", "-c:v mpeg4", "left.mp4");
-  make("right.avi", "-vf \"select='not(eq(n,4))'\" -vsync vfr -c:v mpeg4", "dropped.mp4");
-  EXPECT_EQ(pairs_and_times(options("left.mp4", "dropped.mp4")).first, "1111011111");
-  make("right.avi", "-vf fps=50 -c:v mpeg4", "twice.mp4");
-  EXPECT_EQ(pairs_and_times(options("left.mp4", "twice.mp4")).first, "1111111111");
-  EXPECT_EQ(Recording(options("left.mp4", "twice.mp4")).timing().right_without_left, 10);
-  make("right.avi", "-vf \"setpts=PTS+3/25/TB\" -vsync passthrough -c:v mpeg4", "late.mkv");
-  make("left.avi", "-c:v mpeg4", "left.mkv");
-  EXPECT_EQ(pairs_and_times(options("left.mkv", "late.mkv")).first, "0001111111");
-  Recording recording(options("left.mkv", "late.mkv"));
-  while (const auto frame = recording.next()) {
-    if (frame->right.empty()) continue;
-    EXPECT_GT(frame->right.at<cv::Vec3b>(4 * (frame->index - 3) + 2, 32)[0], 200) << frame->index;
-  }
 }
 
 TEST(Recording, ReadsAPairOfSingleImages) {
