@@ -10,6 +10,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/quantile.h"
 #include "palpate/core/source_kind.h"
+#include "palpate/stereo/image_ends.h"
 #include "palpate/stereo/times_file.h"
 
 namespace palpate {
@@ -88,6 +89,10 @@ class ImageFiles : public FrameSource {
   }
 
   cv::Mat load(const std::filesystem::path& file) {
+    if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
+      throw BadInput(fmt::format("{}: {} {}, expected an image", key_, file.string(), obstacle));
+    if (is_cut_short(file))
+      throw BadInput(fmt::format("{}: {} is cut short, expected a whole image", key_, file.string()));
     const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
     if (image.empty()) throw BadInput(fmt::format("{}: {} is not an image that opens", key_, file.string()));
     if (image.depth() == CV_8U) return image;
