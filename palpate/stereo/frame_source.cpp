@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "palpate/core/clock.h"
 #include "palpate/core/errors.h"
 #include "palpate/core/quantile.h"
 #include "palpate/core/source_kind.h"
@@ -17,6 +18,8 @@ namespace palpate {
 namespace {
 
 constexpr double kUsualFps = 25;
+/// With an address, for each picture.
+constexpr int kPatience_ms = 5000;
 
 std::string small_extension(const std::filesystem::path& file) {
   std::string ending = file.extension().string();
@@ -126,10 +129,17 @@ class ImageFiles : public FrameSource {
 /// What OpenCV finds behind an address.
 class AddressSource : public FrameSource {
  public:
-  AddressSource(const std::string& address, const std::string& key) : capture_(address), address_(address), key_(key) {
-    if (!capture_.isOpened()) throw BadInput(fmt::format("{}: {} cannot be opened as a video", key, address));
-    if (!capture_.read(first_) || first_.empty())
-      throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, address));
+  AddressSource(const std::string& address, const std::string& key) : address_(address), key_(key) {
+    const int64_t begun_ns = steady_ns();
+    // Other backends wait for ever where nobody sends.
+    capture_.open(address, cv::CAP_FFMPEG,
+                  {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, kPatience_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC, kPatience_ms});
+    const bool opened = capture_.isOpened(), shows = opened && capture_.read(first_) && !first_.empty();
+    if (!shows && steady_ns() - begun_ns >= kPatience_ms * 1'000'000LL)
+      throw BadInput(fmt::format("{}: {} gives no picture within {} s; does anything send there?", key, address,
+                                 kPatience_ms / 1000));
+    if (!opened) throw BadInput(fmt::format("{}: {} cannot be opened as a video", key, address));
+    if (!shows) throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, address));
     size_ = first_.size();
     has_end_ = capture_.get(cv::CAP_PROP_FRAME_COUNT) > 0;
   }

@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <chrono>
 #include <opencv2/imgcodecs.hpp>
 
 #include "palpate/stereo/frame_source.h"
@@ -75,6 +76,13 @@ TEST(BrokenPictures, AnImageThatMayNotBeReadSaysSo) {
   std::filesystem::permissions(file, std::filesystem::perms::none);
   for (const std::filesystem::path& images : {file, folder / "image%d.png"})
     EXPECT_THAT(sentence_as_nobody(images), AllOf(HasSubstr("image7.png"), HasSubstr("Permission denied"))) << images;
+}
+
+TEST(BrokenPictures, AnAddressToWhichNothingIsSentIsGivenUp) {
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_THAT(sentence_of([] { open_frame_source("udp://127.0.0.1:59467", "recording.left", 0); }),
+              AllOf(HasSubstr("recording.left: udp://127.0.0.1:59467"), HasSubstr("no picture within 5 s")));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(20));
 }
 
 }  // namespace
