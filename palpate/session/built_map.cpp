@@ -43,6 +43,13 @@ bool shows_something(const StereoFrame& frame) {
          cv::norm(frame.right, cv::NORM_INF) > kBlack_levels;
 }
 
+/// " (the next one is frame 3)", where there is one.
+std::string next_with_both(Recording& recording) {
+  while (const std::optional<StereoFrame> frame = recording.next())
+    if (!frame->left.empty() && !frame->right.empty()) return fmt::format(" (the next one is frame {})", frame->index);
+  return {};
+}
+
 /// The frames that the map is built from, the last of them its static frame. Throws BadInput.
 std::vector<StereoFrame> static_frames(Recording& recording, const MapOptions& options) {
   std::optional<StereoFrame> frame = recording.next();
@@ -64,9 +71,9 @@ std::vector<StereoFrame> static_frames(Recording& recording, const MapOptions& o
     throw BadInput(
         fmt::format("map.frame is {}, but the recording has only {} frames", options.frame, recording.frame_count()));
   if (frame->right.empty())
-    throw BadInput(
-        fmt::format("map.frame is {}, but the right camera shows nothing of that time, expected a frame that both have",
-                    options.frame));
+    throw BadInput(fmt::format(
+        "map.frame is {}, but the right camera shows nothing of that time, expected a frame that both have{}",
+        options.frame, next_with_both(recording)));
   frames.push_back(*frame);
   if (recording.is_live())
     for (StereoFrame& taken : frames) taken.index = -1;

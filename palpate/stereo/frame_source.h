@@ -21,7 +21,8 @@ class FrameSource {
   virtual ~FrameSource() = default;
   virtual std::optional<Frame> next() = 0;
   virtual cv::Size size() const = 0;
-  /// By which stamps can be compared with those of another source: "mpegts", "numbers", ...
+  /// What the stamps count: "numbers" those of images, "stamps" and "file" from 0 or from 1970, else the name of a kind
+  /// of stream that begins at any time ("mpegts").
   virtual std::string clock() const = 0;
   /// Of every frame, ascending; empty = not known (addresses).
   virtual const std::vector<double>& stamps_s() const = 0;

@@ -182,6 +182,12 @@ void check_alike(const RecordingOptions& options, const FrameSource& left, const
         options.left.string(), options.right.string(), a.front() * left.stated_fps(), b.front() * right.stated_fps()));
 }
 
+/// Files count from 0, and so do numbers of images, unless the first is 1; stamps may. Streams begin at any time.
+bool counts_from_zero(const FrameSource& source) {
+  if (source.clock() == "numbers") return std::lround(source.stamps_s().front() * source.stated_fps()) != 1;
+  return source.clock() == "file" || source.clock() == "stamps";
+}
+
 /// Where steps vary, a stated rate is that of no frame.
 double mean_fps(const FrameSource& source, const RecordingTiming& timing) {
   const std::vector<double>& stamps = source.stamps_s();
@@ -253,7 +259,9 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   if (!stamps.empty()) s.first_stamp_s = stamps.front();
   s.pairing.timing = timing_of(stamps);
   if (s.second && !s.has_no_stamps()) {
-    s.pairing = pair_by_stamp(stamps, s.second->stamps_s(), s.first->clock() == s.second->clock());
+    const bool one_clock =
+        s.first->clock() == s.second->clock() || (counts_from_zero(*s.first) && counts_from_zero(*s.second));
+    s.pairing = pair_by_stamp(stamps, s.second->stamps_s(), one_clock);
     if (s.pairing.timing.left_without_right == static_cast<int>(stamps.size()))
       throw BadInput(
           fmt::format("recording: no frame of {} is of the time of one of {}, expected both to show the same "
@@ -266,7 +274,9 @@ Recording::Recording(const RecordingOptions& options) : sources_(std::make_uniqu
   s.fps = options.fps > 0 ? options.fps : mean_fps(*s.first, s.pairing.timing);
   if (!(s.fps > 0)) s.fps = kFallbackFps;
   s.notes = notes_of(s.pairing.timing, held, s.pairing.right_shift_s);
-  if (!s.first->note().empty()) s.notes.push_back(s.first->note());
+  for (const FrameSource* source : {s.first.get(), s.second.get()})
+    if (source && !source->note().empty() && (s.notes.empty() || s.notes.back() != source->note()))
+      s.notes.push_back(source->note());
   if (s.first->is_interlaced() && !options.deinterlace)
     s.notes.push_back("the pictures are interlaced, every second row is of another moment: set recording.deinterlace");
 }

@@ -7,6 +7,7 @@
 
 #include "palpate/core/errors.h"
 #include "palpate/stereo/frame_source.h"
+#include "palpate/stereo/packet_stamps.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -94,6 +95,7 @@ class VideoFile : public FrameSource {
     scan();
     input_ = open_input(file, key);
     stream_ = video_stream_of(*input_);
+    parts_.emplace(frame_ticks(*input_->streams[stream_]));
     open_decoder();
     first_ = decode();
     if (!first_) throw BadInput(fmt::format("{}: {} holds no frame that can be decoded", key, file.string()));
@@ -113,7 +115,10 @@ class VideoFile : public FrameSource {
     return frame;
   }
   cv::Size size() const override { return size_; }
-  std::string clock() const override { return input_->iformat->name; }
+  /// Streams that can be cut anywhere begin at any time, all others at 0.
+  std::string clock() const override {
+    return (input_->iformat->flags & AVFMT_TS_DISCONT) != 0 ? input_->iformat->name : "file";
+  }
   const std::vector<double>& stamps_s() const override { return stamps_s_; }
   double stated_fps() const override {
     const double rate = av_q2d(input_->streams[stream_]->r_frame_rate);
@@ -127,6 +132,7 @@ class VideoFile : public FrameSource {
     return stopped ? static_cast<int>(stamps_s_.size()) : 0;
   }
   bool is_interlaced() const override { return is_interlaced_; }
+  std::string note() const override { return note_; }
 
  private:
   /// The stamps of all packets that are shown: nothing is decoded. Packets before the first key frame cannot be.
@@ -136,17 +142,28 @@ class VideoFile : public FrameSource {
     if (index < 0) throw BadInput(fmt::format("{}: {} holds no video", key_, file_.string()));
     AVStream& stream = *input->streams[index];
     const double seconds = av_q2d(stream.time_base);
+    const int64_t frame = frame_ticks(stream);
+    JoinedParts parts(frame);
+    std::vector<PacketStamp> packets;
+    size_t read = 0, first_joint = 0;
     bool after_key = false;
-    while (av_read_frame(input.get(), packet_.get()) >= 0) {
+    for (; av_read_frame(input.get(), packet_.get()) >= 0; av_packet_unref(packet_.get())) {
       const AVPacket& packet = *packet_;
+      if (packet.stream_index != index) continue;
+      PacketStamp stamp{packet.pts, packet.dts};
+      if (parts.join(stamp)) {
+        if (joints_.empty()) first_joint = packets.size();
+        joints_.push_back(read);
+      }
+      ++read;
       after_key = after_key || (packet.flags & AV_PKT_FLAG_KEY) != 0;
-      const int64_t stamp = packet.pts != AV_NOPTS_VALUE ? packet.pts : packet.dts;
-      if (packet.stream_index == index && packet.size > 0 && after_key && (packet.flags & AV_PKT_FLAG_DISCARD) == 0)
-        stamps_s_.push_back(stamp != AV_NOPTS_VALUE ? static_cast<double>(stamp) * seconds
-                                                    : static_cast<double>(stamps_s_.size()) / rate_of(stream));
-      av_packet_unref(packet_.get());
+      if (packet.size > 0 && after_key && (packet.flags & AV_PKT_FLAG_DISCARD) == 0) packets.push_back(stamp);
     }
-    std::sort(stamps_s_.begin(), stamps_s_.end());
+    for (const int64_t ticks : shown_stamps(packets, frame)) stamps_s_.push_back(static_cast<double>(ticks) * seconds);
+    if (!joints_.empty())
+      note_ = fmt::format(
+          "{}: its times jump back {} times, first at frame {}: what follows is counted on from there, one frame later",
+          file_.string(), joints_.size(), first_joint);
     const auto held = static_cast<int64_t>(stamps_s_.size());
     const std::string format = input->iformat->name;
     if (ends_early(file_, format))
@@ -163,6 +180,10 @@ class VideoFile : public FrameSource {
   static double rate_of(const AVStream& stream) {
     const double rate = av_q2d(stream.r_frame_rate);
     return std::isfinite(rate) && rate > 0 ? rate : 25;
+  }
+
+  static int64_t frame_ticks(const AVStream& stream) {
+    return std::max<int64_t>(1, std::llround(1 / (rate_of(stream) * av_q2d(stream.time_base))));
   }
 
   void open_decoder() {
@@ -195,21 +216,44 @@ class VideoFile : public FrameSource {
         avcodec_send_packet(codec_.get(), nullptr);
         continue;
       }
-      // What cannot be decoded is left out: the stamps of the others stand.
-      const bool is_whole = packet_->size > 0 && !(packet_->flags & AV_PKT_FLAG_CORRUPT);
-      if (packet_->stream_index == stream_ && is_whole) avcodec_send_packet(codec_.get(), packet_.get());
+      if (packet_->stream_index == stream_) decode_packet();
       av_packet_unref(packet_.get());
     }
+  }
+
+  /// What cannot be decoded is left out: the stamps of the others stand.
+  void decode_packet() {
+    PacketStamp stamp{packet_->pts, packet_->dts};
+    parts_->join(stamp);
+    ++read_;
+    packet_->pts = stamp.shown;
+    packet_->dts = stamp.decoded;
+    if (packet_->size == 0) return;
+    // Packets of a stream are numbered anew where parts join: nothing of the last frames is missing for that.
+    constexpr size_t kHeldBack = 2;
+    const auto joint = std::lower_bound(joints_.begin(), joints_.end(), read_);
+    const bool before_joint = joint != joints_.end() && *joint <= read_ + kHeldBack;
+    const bool is_whole = (packet_->flags & AV_PKT_FLAG_CORRUPT) == 0 || before_joint;
+    const bool is_sent = is_whole && avcodec_send_packet(codec_.get(), packet_.get()) >= 0;
+    if (!is_sent && stamp.shown == kNoStamp) shown_s_ = stamp_after(shown_s_);
+  }
+
+  double seconds_of(int64_t ticks) const {
+    return static_cast<double>(ticks) * av_q2d(input_->streams[stream_]->time_base);
+  }
+
+  double stamp_after(double stamp_s) const {
+    const auto after = std::upper_bound(stamps_s_.begin(), stamps_s_.end(), stamp_s);
+    return after != stamps_s_.end() ? *after : stamp_s + 1 / rate_of(*input_->streams[stream_]);
   }
 
   Frame shown() {
     const AVFrame& picture = *picture_;
     is_interlaced_ = is_interlaced_ || picture.interlaced_frame != 0;
     Frame frame;
-    const int64_t stamp = picture.best_effort_timestamp;
-    frame.time_s = stamp != AV_NOPTS_VALUE ? static_cast<double>(stamp) * av_q2d(input_->streams[stream_]->time_base)
-                                           : static_cast<double>(decoded_) / rate_of(*input_->streams[stream_]);
-    ++decoded_;
+    // Time never runs backwards.
+    const bool has_stamp = picture.pts != AV_NOPTS_VALUE && seconds_of(picture.pts) >= shown_s_;
+    shown_s_ = frame.time_s = has_stamp ? seconds_of(picture.pts) : stamp_after(shown_s_);
     frame.image.create(picture.height, picture.width, CV_8UC3);
     const auto format = static_cast<AVPixelFormat>(picture.format);
     scaler_ = sws_getCachedContext(scaler_, picture.width, picture.height, format, picture.width, picture.height,
@@ -252,8 +296,12 @@ class VideoFile : public FrameSource {
   SwsContext* scaler_ = nullptr;
   cv::Size size_;
   std::optional<Frame> first_;
-  double last_stamp_s_ = HUGE_VAL;
-  long decoded_ = 0;
+  std::optional<JoinedParts> parts_;
+  double shown_s_ = -HUGE_VAL;      ///< stamp of the frame decoded last
+  double last_stamp_s_ = HUGE_VAL;  ///< of the frame handed on last
+  std::vector<size_t> joints_;      ///< packets that begin a part
+  size_t read_ = 0;                 ///< packets so far
+  std::string note_;
   bool is_interlaced_ = false;
 };
 
