@@ -133,6 +133,8 @@ RunSummary run_estimate(const SceneFile& scene_file, const RunOptions& options) 
     }
   }
   run.close();
+  if (!options.quiet)
+    for (const std::string& damage : run.damages()) fmt::print(stderr, "warning     {}\n", damage);
   const RunFiles& files = run.files();
   if (files.losses.any())
     throw Unfinished(

@@ -12,10 +12,14 @@
 #include "app/verbs.h"
 #include "palpate/instrument/instrument_finder.h"
 #include "palpate/session/output_folder.h"
+#include "palpate/stereo/read_through.h"
 
 namespace palpate::app {
 
 namespace {
+
+/// For looking at all pictures of a recording.
+constexpr double kPatience_s = 10;
 
 std::vector<std::string> attachment_kinds(const AttachmentOptions& attachments) {
   using Kind = AttachmentRegion::Kind;
@@ -83,9 +87,13 @@ void add_check(CLI::App& app) {
   verb->callback([arguments] {
     const SceneFile scene_file = read_scene_file(arguments->scene, true);
     if (!arguments->folder.empty()) require_output_folder(arguments->folder);
-    const BuiltMap built = build_map(scene_file, arguments->json);
+    BuiltMap built = build_map(scene_file, arguments->json);
     // A network that cannot run is said here, not after the map of a run.
     const InstrumentFinder finder(scene_file.scene.instrument, built.frame.left, built.map.organ_mask);
+    for (const std::string& note : read_through(scene_file.scene.recording, kPatience_s)) {
+      if (!arguments->json) fmt::print(stderr, "note        {}\n", note);
+      built.notes.push_back(note);
+    }
     std::optional<TrackCheck> track;
     if (const InstrumentOptions& instrument = scene_file.scene.instrument;
         !instrument.track.empty() && !instrument.has_live_track() && !built.timing.is_live)

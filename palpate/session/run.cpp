@@ -132,6 +132,10 @@ int Run::frame_count() const {
   return state_->recording->frame_count();
 }
 
+std::vector<std::string> Run::damages() const {
+  return state_->recording->damages();
+}
+
 const RunFiles& Run::files() const {
   return *state_->files;
 }

@@ -43,6 +43,7 @@ class Run {
 
   int frame_count() const;  ///< -1 when unknown
   int dropped() const;      ///< frames of a live source that a newer one replaced before they were looked at
+  std::vector<std::string> damages() const;  ///< sentences about damaged frames so far
   const RunFiles& files() const;
   const StreamHub& streams() const;
   /// Both pictures of the last frame.

@@ -173,7 +173,8 @@ class AddressSource : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps) {
+std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps,
+                                               bool strict) {
   const std::string name = path.string();
   if (kind_of_source(name) == SourceKind::address) return std::make_unique<AddressSource>(name, key);
   std::error_code ignored;
@@ -188,7 +189,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path
   if (const std::string obstacle = obstacle_to_reading(path); !obstacle.empty())
     throw BadInput(fmt::format("{}: {} {}, expected a video", key, name, obstacle));
   if (is_image_name(path)) return std::make_unique<ImageFiles>(std::vector{NumberedFile{0, path}}, key, fps);
-  return open_video_file(path, key);
+  return open_video_file(path, key, strict);
 }
 
 }  // namespace palpate

@@ -34,14 +34,19 @@ class FrameSource {
   virtual bool is_interlaced() const { return false; }
   /// A sentence on how it was read that a user ought to know.
   virtual std::string note() const { return {}; }
+  /// A sentence on the frames that were found damaged so far; empty = none.
+  virtual std::string damage() const { return {}; }
 };
 
 /// `key` names the source in sentences: "recording.left". `fps` numbers images whose times are not told by their names
-/// or a file beside them; 0 = as usual. Throws BadInput: missing, empty, not to be opened.
-std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps);
+/// or a file beside them; 0 = as usual. `strict` leaves damaged frames of videos out, instead of showing what can be
+/// guessed of them, and finds more of them. Throws BadInput: missing, empty, not to be opened.
+std::unique_ptr<FrameSource> open_frame_source(const std::filesystem::path& path, const std::string& key, double fps,
+                                               bool strict = false);
 
 /// A video file by FFmpeg: edit lists, empty chunks and a start other than zero are in the stamps.
-std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key);
+std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key,
+                                             bool strict = false);
 
 /// Images of a pattern such as left_%04d.png or %04d/left.png, by rising number, gaps allowed; empty where the path
 /// holds no placeholder. `%%` is a percent sign; so is a `%` that looks like a placeholder where images are found so

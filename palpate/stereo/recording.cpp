@@ -356,5 +356,11 @@ void Recording::listen(std::function<void(const StereoFrame&)> listener) {
 const std::vector<std::string>& Recording::notes() const {
   return sources_->notes;
 }
+std::vector<std::string> Recording::damages() const {
+  std::vector<std::string> sentences;
+  for (const FrameSource* source : {sources_->first.get(), sources_->second.get()})
+    if (source && !source->damage().empty()) sentences.push_back(source->damage());
+  return sentences;
+}
 
 }  // namespace palpate

@@ -80,6 +80,8 @@ class Recording {
   void listen(std::function<void(const StereoFrame&)> listener);
   /// Sentences about the files that a user ought to know: a varying rate, combed pictures, how left and right lie.
   const std::vector<std::string>& notes() const;
+  /// Sentences about the frames so far that a decoder called damaged; what they show is guessed in part.
+  std::vector<std::string> damages() const;
 
  private:
   struct Sources;

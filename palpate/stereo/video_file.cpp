@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <set>
 
 #include "palpate/core/errors.h"
 #include "palpate/stereo/frame_source.h"
@@ -90,8 +91,8 @@ bool ends_early(const std::filesystem::path& file, const std::string& format) {
 
 class VideoFile : public FrameSource {
  public:
-  VideoFile(const std::filesystem::path& file, const std::string& key)
-      : file_(file), key_(key), packet_(av_packet_alloc()), picture_(av_frame_alloc()) {
+  VideoFile(const std::filesystem::path& file, const std::string& key, bool strict)
+      : file_(file), key_(key), strict_(strict), packet_(av_packet_alloc()), picture_(av_frame_alloc()) {
     scan();
     input_ = open_input(file, key);
     stream_ = video_stream_of(*input_);
@@ -128,11 +129,17 @@ class VideoFile : public FrameSource {
   int frames_if_whole() const override {
     if (frames_if_whole_ > 0) return frames_if_whole_;
     if (is_broken_off_) return static_cast<int>(stamps_s_.size());
-    const bool stopped = stamps_s_.size() > 2 && last_stamp_s_ < *(stamps_s_.end() - 3);
+    const bool stopped = !strict_ && stamps_s_.size() > 2 && last_stamp_s_ < *(stamps_s_.end() - 3);
     return stopped ? static_cast<int>(stamps_s_.size()) : 0;
   }
   bool is_interlaced() const override { return is_interlaced_; }
   std::string note() const override { return note_; }
+  std::string damage() const override {
+    if (damaged_.empty()) return {};
+    return fmt::format("{}: {}{} of the frames read from it {} damaged, the first is frame {}", file_.string(),
+                       strict_ ? "" : "at least ", damaged_.size(), damaged_.size() == 1 ? "is" : "are",
+                       *damaged_.begin());
+  }
 
  private:
   /// The stamps of all packets that are shown: nothing is decoded. Packets before the first key frame cannot be.
@@ -193,7 +200,8 @@ class VideoFile : public FrameSource {
     if (!codec || !codec_ || avcodec_parameters_to_context(codec_.get(), stream.codecpar) < 0)
       throw BadInput(fmt::format("{}: {} is coded in a way that cannot be decoded here ({})", key_, file_.string(),
                                  avcodec_get_name(stream.codecpar->codec_id)));
-    codec_->thread_count = 0;
+    codec_->thread_count = strict_ ? 1 : 0;  // an error is that of the packet before it
+    if (strict_) codec_->err_recognition |= AV_EF_EXPLODE;
     codec_->pkt_timebase = stream.time_base;
     if (avcodec_open2(codec_.get(), codec, nullptr) < 0)
       throw BadInput(fmt::format("{}: {} cannot be decoded ({})", key_, file_.string(), codec->name));
@@ -209,6 +217,10 @@ class VideoFile : public FrameSource {
         Frame frame = shown();
         av_frame_unref(picture_.get());
         return frame;
+      }
+      if (received == AVERROR_INVALIDDATA) {
+        damaged_at(sent_s_);
+        continue;
       }
       if (received != AVERROR(EAGAIN)) return std::nullopt;
       if (const int read = av_read_frame(input_.get(), packet_.get()); read < 0) {
@@ -234,8 +246,11 @@ class VideoFile : public FrameSource {
     const auto joint = std::lower_bound(joints_.begin(), joints_.end(), read_);
     const bool before_joint = joint != joints_.end() && *joint <= read_ + kHeldBack;
     const bool is_whole = (packet_->flags & AV_PKT_FLAG_CORRUPT) == 0 || before_joint;
-    const bool is_sent = is_whole && avcodec_send_packet(codec_.get(), packet_.get()) >= 0;
-    if (!is_sent && stamp.shown == kNoStamp) shown_s_ = stamp_after(shown_s_);
+    after_key_ = after_key_ || (packet_->flags & AV_PKT_FLAG_KEY) != 0;
+    sent_s_ = stamp.shown != kNoStamp ? seconds_of(stamp.shown) : stamp_after(shown_s_);
+    if ((is_whole && avcodec_send_packet(codec_.get(), packet_.get()) >= 0) || !after_key_) return;
+    damaged_at(sent_s_);
+    if (stamp.shown == kNoStamp) shown_s_ = sent_s_;
   }
 
   double seconds_of(int64_t ticks) const {
@@ -247,6 +262,10 @@ class VideoFile : public FrameSource {
     return after != stamps_s_.end() ? *after : stamp_s + 1 / rate_of(*input_->streams[stream_]);
   }
 
+  void damaged_at(double stamp_s) {
+    damaged_.insert(std::lower_bound(stamps_s_.begin(), stamps_s_.end(), stamp_s) - stamps_s_.begin());
+  }
+
   Frame shown() {
     const AVFrame& picture = *picture_;
     is_interlaced_ = is_interlaced_ || picture.interlaced_frame != 0;
@@ -254,6 +273,7 @@ class VideoFile : public FrameSource {
     // Time never runs backwards.
     const bool has_stamp = picture.pts != AV_NOPTS_VALUE && seconds_of(picture.pts) >= shown_s_;
     shown_s_ = frame.time_s = has_stamp ? seconds_of(picture.pts) : stamp_after(shown_s_);
+    if ((picture.flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture.decode_error_flags != 0) damaged_at(frame.time_s);
     frame.image.create(picture.height, picture.width, CV_8UC3);
     const auto format = static_cast<AVPixelFormat>(picture.format);
     scaler_ = sws_getCachedContext(scaler_, picture.width, picture.height, format, picture.width, picture.height,
@@ -284,6 +304,7 @@ class VideoFile : public FrameSource {
 
   std::filesystem::path file_;
   std::string key_;
+  bool strict_;
   std::vector<double> stamps_s_;
   int frames_if_whole_ = 0;
   bool is_broken_off_ = false;  ///< the medium failed while it was read
@@ -301,14 +322,17 @@ class VideoFile : public FrameSource {
   double last_stamp_s_ = HUGE_VAL;  ///< of the frame handed on last
   std::vector<size_t> joints_;      ///< packets that begin a part
   size_t read_ = 0;                 ///< packets so far
+  double sent_s_ = 0;               ///< stamp of the packet decoded last
+  bool after_key_ = false;
+  std::set<long> damaged_;  ///< numbers of frames
   std::string note_;
   bool is_interlaced_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key) {
-  return std::make_unique<VideoFile>(file, key);
+std::unique_ptr<FrameSource> open_video_file(const std::filesystem::path& file, const std::string& key, bool strict) {
+  return std::make_unique<VideoFile>(file, key, strict);
 }
 
 }  // namespace palpate

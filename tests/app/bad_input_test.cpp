@@ -75,6 +75,13 @@ TEST_F(BadInput, AFrameWithoutItsRightPictureIsARowThatSaysSo) {
   EXPECT_THAT(rows.substr(rows.rfind("\n2,")), AllOf(HasSubstr("tool_lost"), HasSubstr("camera_missing")));
 }
 
+TEST_F(BadInput, AVideoThatIsCutIsFoundByACheckBeforeARunFindsIt) {
+  std::filesystem::resize_file(in("right.avi"), std::filesystem::file_size(in("right.avi")) * 4 / 5);
+  const Outcome outcome = run_palpate("check " + in("scene.yaml").string());
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
+  EXPECT_THAT(outcome.error, HasSubstr("right.avi ends after 2 frames, its header states 3"));
+}
+
 TEST_F(BadInput, EyesOfDifferentSizeAreNoticed) {
   const cv::Mat small = plane_pair(0).right(cv::Rect(0, 0, 160, 240)).clone();
   write_avi(in("right.avi"), {small, small, small});
