@@ -62,15 +62,33 @@ bool is_number(std::string_view cell) {
   return std::isfinite(number_of(text));
 }
 
-/// "N", "(N)" and "[N]" are the same.
-std::string without_brackets(std::string_view cell) {
-  return header_cell("u (" + unquoted(cell) + ")").unit;
+bool is_in_brackets(std::string_view cell) {
+  const std::string text = unquoted(cell);
+  return text.size() > 1 &&
+         ((text.front() == '(' && text.back() == ')') || (text.front() == '[' && text.back() == ']') ||
+          (text.front() == '{' && text.back() == '}'));
 }
 
+/// "N", "(N)" and "[N]" are the same.
+std::string without_brackets(std::string_view cell) {
+  const std::string text = unquoted(cell);
+  return is_in_brackets(cell) ? std::string(trimmed(std::string_view(text).substr(1, text.size() - 2))) : text;
+}
+
+/// Words only, with a unit among them, or all of them in brackets, which then are units that are not known.
 bool names_units(const std::vector<std::string_view>& fields) {
+  const auto is_empty = [](auto cell) { return unquoted(cell).empty(); };
   return std::none_of(fields.begin(), fields.end(), is_number) &&
-         std::any_of(fields.begin(), fields.end(),
-                     [](auto cell) { return unit_of(without_brackets(cell)).has_value(); });
+         !std::all_of(fields.begin(), fields.end(), is_empty) &&
+         (std::any_of(fields.begin(), fields.end(), [](auto cell) { return unit_of(without_brackets(cell)); }) ||
+          std::all_of(fields.begin(), fields.end(), [&](auto cell) { return is_empty(cell) || is_in_brackets(cell); }));
+}
+
+/// Without the empty ones at the end, which a spreadsheet leaves there.
+size_t count_filled(const std::vector<std::string_view>& fields) {
+  size_t count = fields.size();
+  while (count > 0 && unquoted(fields[count - 1]).empty()) --count;
+  return count;
 }
 
 /// "Counts per Unit Force: 1000000.0" in two.
@@ -88,18 +106,23 @@ Table::Table(const std::filesystem::path& file, const std::vector<TableColumn>& 
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(
         fmt::format("{} {}, expected a table with a header that names its columns", file.string(), obstacle));
-  text_ = as_utf8(read_whole_file(file));
+  text_ = with_plain_minus(as_utf8(read_whole_file(file)));
   find_header(columns);
 
   LineSplitter lines(text_, separator_);
   std::vector<std::string_view> fields, header, units;
-  size_t doubled = 0, judged = 0;
+  struct {
+    int line = 0;
+    size_t values = 0;
+  } too_long;
   while (lines.next(fields)) {
     const bool is_blank = trimmed(lines.whole()).empty();
     if (lines.line() < header_line_) {
       if (!is_blank) before_.push_back(key_and_value(lines.whole()));
     } else if (lines.line() == header_line_) {
       header = fields;
+      // "# t x y" of numpy.savetxt: the mark is no column.
+      if (fields.size() > 1 && (trimmed(fields[0]) == "#" || trimmed(fields[0]) == "%")) header.erase(header.begin());
     } else if (!is_blank && !is_comment(lines.whole())) {
       if (rows_.empty() && units.empty() && names_units(fields)) {
         units = fields;
@@ -107,20 +130,24 @@ Table::Table(const std::filesystem::path& file, const std::vector<TableColumn>& 
       }
       rows_.push_back({lines.line(), cells_.size(), fields.size()});
       cells_.insert(cells_.end(), fields.begin(), fields.end());
-      if (judged >= kRowsToJudge) continue;
-      ++judged;
-      doubled += fields.size() + 1 >= 2 * header.size() && header.size() > 1;
+      if (const size_t values = count_filled(fields); too_long.line == 0 && values > header.size())
+        too_long = {lines.line(), values};
     }
   }
-  if (separator_ == ',' && judged > 0 && 2 * doubled > judged)
-    throw BadInput(
-        fmt::format("{}: rows have twice as many values as the {} columns named ({}): the comma both separates columns "
-                    "and marks decimals; expected semicolons between the columns, or decimal points",
-                    file_.string(), header.size(), header_found()));
   columns_.clear();
   for (const TableColumn& column : columns)
     if (const auto field = field_of(column, header)) columns_[column.name].index = *field;
-  place_columns(columns, units.empty() ? header : units);
+  // Where the header names no column, that is what has to be said.
+  if (too_long.line > 0 && !columns_.empty())
+    throw BadInput(fmt::format("{}: line {} has {} values, the header {} columns{}; {}", file_.string(), too_long.line,
+                               too_long.values, header.size(),
+                               separator_ == ','
+                                   ? ": where a comma both separates columns and marks decimals or thousands, expected "
+                                     "semicolons between the columns, or quotes around the numbers"
+                                   : ", expected one value in each column",
+                               header_found()));
+  place_columns(columns, header);
+  if (!units.empty()) place_columns(columns, units);
   find_decimal_mark();
 }
 
@@ -170,11 +197,14 @@ void Table::place_columns(const std::vector<TableColumn>& columns, const std::ve
     Place& place = found->second;
     const std::optional<Unit> wanted = unit_of(header_cell(column.name).unit);
     if (place.index >= units.size()) continue;
-    place.unit = header_cell(units[place.index]).unit;
-    if (place.unit.empty() && unit_of(without_brackets(units[place.index])))
-      place.unit = without_brackets(units[place.index]);
+    const std::string_view cell = units[place.index];
+    const bool is_unit = unit_of(without_brackets(cell)).has_value() || is_in_brackets(cell);
+    const std::string stated = is_unit ? without_brackets(cell) : header_cell(cell).unit;
+    if (stated.empty()) continue;
+    place.unit = stated;
     const std::optional<Unit> unit = unit_of(place.unit);
-    if (!wanted || place.unit.empty()) continue;
+    if (!wanted) continue;
+    place.wrong_unit.clear();
     if (unit && unit->kind == wanted->kind)
       place.factor = unit->factor / wanted->factor;
     else if (unit || wanted->kind != Unit::Kind::time)  // "Time (hh:mm:ss)" is read as text

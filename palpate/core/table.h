@@ -29,8 +29,8 @@ class Table {
     size_t cells = 0;
   };
 
-  /// The header is the line that names most of `columns`. Throws BadInput when the file cannot be read, or when the
-  /// commas in it both separate and mark decimals.
+  /// The header is the line that names most of `columns`. Throws BadInput when the file cannot be read, or when a row
+  /// has more values than the header has columns: which of them stands in which cannot be told.
   Table(const std::filesystem::path& file, const std::vector<TableColumn>& columns);
 
   const std::vector<Row>& rows() const { return rows_; }

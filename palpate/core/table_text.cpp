@@ -61,6 +61,10 @@ std::string unquoted(std::string_view cell) {
   return std::string(trimmed(text));
 }
 
+bool has_byte_order_mark(std::string_view text) {
+  return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") || text.starts_with(kByteOrderMark);
+}
+
 std::string as_utf8(std::string text) {
   if (text.starts_with("\xFF\xFE")) return from_utf16(text, false);
   if (text.starts_with("\xFE\xFF")) return from_utf16(text, true);
@@ -69,6 +73,18 @@ std::string as_utf8(std::string text) {
   for (size_t at = text.find('\xB5'); at != std::string::npos; at = text.find('\xB5', at + 1))
     if (at == 0 || static_cast<uint8_t>(text[at - 1]) < 0x80) text.replace(at, 1, "u");
   return text;
+}
+
+std::string with_plain_minus(std::string text) {
+  constexpr const char* kMinus = "\xE2\x88\x92";
+  if (text.find(kMinus) == std::string::npos) return text;
+  std::string plain;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const bool is_minus = text.compare(i, 3, kMinus) == 0;
+    plain += is_minus ? '-' : text[i];
+    i += is_minus ? 2 : 0;
+  }
+  return plain;
 }
 
 bool LineSplitter::next(std::vector<std::string_view>& fields) {

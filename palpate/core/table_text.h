@@ -12,8 +12,14 @@ namespace palpate {
 std::string_view trimmed(std::string_view text);
 std::string unquoted(std::string_view cell);
 
+/// Of UTF-8 or UTF-16.
+bool has_byte_order_mark(std::string_view text);
+
 /// As UTF-8 without byte order mark, whichever of UTF-8, UTF-16 and Latin-1 it came in.
 std::string as_utf8(std::string text);
+
+/// With "-" for the minus sign of Unicode, which R, matplotlib and word processors write.
+std::string with_plain_minus(std::string text);
 
 /// A field that begins with a quote ends with one, and may hold separators and line ends.
 class LineSplitter {

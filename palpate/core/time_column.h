@@ -20,8 +20,9 @@ struct TimeHints {
 
 /// Seconds of each row, NaN where it states none: a number in s, ms, us or ns (by the header, else by which of them the
 /// hints allow), seconds and nanoseconds of ROS in two columns, or a time of day with or without its date (`1:05:07.010
-/// PM`, `2025-11-03T13:05:07.010`), then counted from midnight of the first day. Throws BadInput where there is no such
-/// column, or no unit fits; the sentence shows the value.
+/// PM`, `13:05:07:010`, `2025-11-03T13:05:07.010`), then counted from midnight of the first day. Rows of a logger that
+/// writes whole seconds lie evenly within them. Throws BadInput where there is no such column, no unit fits, or whole
+/// seconds hold different numbers of rows; the sentence shows the value.
 std::vector<double> times_s(const Table& table, const TimeHints& hints);
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include "palpate/core/table.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -110,6 +111,39 @@ TEST_F(TableFile, SaysWhatItFoundWhereAColumnIsMissing) {
   EXPECT_THROW(volts.number(volts.rows()[0], "fx_N"), BadInput);
 }
 
+TEST_F(TableFile, WithMoreValuesThanColumnsIsRefusedByItsLine) {
+  const std::string plain = "Time,Fx,Fy,Fz\n0,1,2,3\n";
+  EXPECT_THAT(refusal(plain + "0.5,1,234.5,2,3\n"),
+              testing::AllOf(testing::HasSubstr("line 3 has 5 values, the header 4 columns"),
+                             testing::HasSubstr("decimals or thousands"), testing::HasSubstr("'Time,Fx,Fy,Fz'")));
+  // Where only some of the numbers have decimals, most rows are not twice as long.
+  EXPECT_THAT(refusal("Time,Fx,Fy,Fz,a,b\n0,5,1,2,3,0,0\n0,6,1,2,3,0,0\n"), testing::HasSubstr("line 2 has 7 values"));
+  EXPECT_THAT(refusal("Time;Fx;Fy;Fz\n0;1;2;3;4\n"), testing::HasSubstr("one value in each column"));
+  EXPECT_EQ(refusal(plain + "0.5,1,2,3,,\n1,1,2,3, ,\"\"\n"), "");
+  expect_row(plain + "0.5,1.25,-2,30,,,\n", 0.5, 1.25, -2, 30);
+  expect_row("Time,Fx,Fy,Fz\n0,1,2,3\n0.5,\"1,234.5\",-2,30\n", 0.5, 1234.5, -2, 30);
+}
+
+TEST_F(TableFile, HasItsUnitsBelowTheHeaderInAnyBrackets) {
+  for (const char* units : {"ms,mN,N,kN", "[ms],[mN],[N],[kN]", "(ms),(mN),(N),(kN)", "{ms},\"[mN]\",[N],[kN]"})
+    expect_row(std::string("Time,Fx,Fy,Fz\n") + units + "\n0,1,2,3\n500,1250,-2,0.03\n", 0.5, 1.25, -2, 30);
+  // What the header states holds where the line below it says nothing.
+  expect_row("Time (ms),Fx (mN),Fy,Fz\n,,[N],[kN]\n0,1,2,3\n500,1250,-2,0.03\n", 0.5, 1.25, -2, 30);
+  const Table volts(write("Time,Fx,Fy,Fz\n[-],[V],[V],[V]\n0,1,2,3\n"), columns());
+  ASSERT_EQ(volts.rows().size(), 1U);
+  EXPECT_THAT([&] { volts.number(volts.rows()[0], "fx_N"); },
+              testing::ThrowsMessage<BadInput>(testing::HasSubstr("fx_N is in V")));
+}
+
+TEST_F(TableFile, MayHaveTheMinusOfUnicodeAndTheHeaderOfNumpy) {
+  expect_row(
+      "Time,Fx,Fy,Fz\n0,1,2,3\n0.5,1.25,\xE2\x88\x92"
+      "2,3e\xE2\x88\x92"
+      "1\n",
+      0.5, 1.25, -2, 0.3);
+  expect_row("# Time Fx Fy Fz\n0 1 2 3\n0.5 1.25 -2 30\n", 0.5, 1.25, -2, 30);
+}
+
 TEST_F(TableFile, HasItsTimeInSecondsWhateverItsUnit) {
   const auto times = [&](const std::vector<std::string>& stamps, const TimeHints& hints) {
     std::string text = "Time,Fx,Fy,Fz\n";
@@ -131,10 +165,40 @@ TEST_F(TableFile, HasItsTimeInSecondsWhateverItsUnit) {
   EXPECT_NEAR(evening[2] - evening[0], 0.02, 1e-9);
   EXPECT_NEAR(times({"2025-11-03T13:05:07.250Z", "2025-11-03T13:05:07.260Z"}, {})[0], 47107.25, 1e-9);
   EXPECT_NEAR(times({"59:59.99", "00:00.01"}, {})[1], 3600.01, 1e-9);
+  EXPECT_NEAR(times({"13:53:20:010", "13:53:20:020"}, {})[1], 50000.02, 1e-9);
+  EXPECT_NEAR(times({"13:53:9.990", "13:53:10.000"}, {})[0], 49989.99, 1e-9);  // seconds of one digit
+  EXPECT_THAT(refusal("Time,Fx,Fy,Fz\n13:53:20:10,1,2,3\n"), testing::HasSubstr(":2: time_s is '13:53:20:10'"));
+  EXPECT_THAT(refusal("Time (ms),Fx,Fy,Fz\n0,1,2,3\n0.1,1,2,3\n4,1,2,3\n", {4.0, 4}),
+              testing::AllOf(testing::HasSubstr("from 0 to 4"), testing::HasSubstr("in s it would fit")));
   EXPECT_THAT(refusal("Time,Fx,Fy,Fz\n0,1,2,3\n777,1,2,3\n1554,1,2,3\n", {4.0}), testing::HasSubstr("steps of 777"));
   EXPECT_THAT(refusal("time_s,Fx,Fy,Fz\n0,1,2,3\n10,1,2,3\n20,1,2,3\n", {4.0}), testing::HasSubstr("10 s apart"));
   const Table ros(write("header.stamp.secs,header.stamp.nsecs,force.x\n1700000000,250000000,1\n"), columns());
   EXPECT_NEAR(times_s(ros, {})[0], 1700000000.25, 1e-6);
+}
+
+/// Stamps in whole seconds of a log with so many rows in each.
+std::string whole_seconds(const std::vector<int>& rows, const char* header = "Time", const char* format = "13:53:{}") {
+  std::string text = std::string(header) + ",Fx,Fy,Fz\n";
+  for (size_t second = 0; second < rows.size(); ++second)
+    for (int row = 0; row < rows[second]; ++row)
+      text += fmt::format(fmt::runtime(format), 20 + second) + fmt::format(",{},2,3\n", row);
+  return text;
+}
+
+TEST_F(TableFile, OfWholeSecondsHasItsRowsEvenlyWithinThem) {
+  for (const auto& [header, format] : {std::pair{"Time", "13:53:{}"}, std::pair{"Time (s)", "{}"}}) {
+    const std::vector<double> times =
+        times_s(Table(write(whole_seconds({40, 100, 99, 25}, header, format)), columns()), {});
+    ASSERT_EQ(times.size(), 264U);
+    EXPECT_NEAR(times[139] - times[0], 1.39, 1e-9);
+    EXPECT_NEAR(times[239] - times[0], 2.4, 1e-9);
+    for (size_t i = 1; i < times.size(); ++i) EXPECT_NEAR(times[i] - times[i - 1], 0.01, 2e-4) << i;
+  }
+  EXPECT_THAT(refusal(whole_seconds({100, 100, 37, 100, 100})),
+              testing::AllOf(testing::HasSubstr("'13:53:22' on 37 rows where other seconds have 100"),
+                             testing::HasSubstr("the header in line 1")));
+  // One row in each second is what it says.
+  EXPECT_NEAR(times_s(Table(write(whole_seconds({1, 1, 1, 1})), columns()), {})[3], 50003, 1e-9);
 }
 
 }  // namespace
