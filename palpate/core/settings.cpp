@@ -10,6 +10,7 @@
 #include "palpate/core/errors.h"
 #include "palpate/core/settings_file.h"
 #include "palpate/core/source_kind.h"
+#include "palpate/core/table_text.h"
 #include "palpate/core/whole_file.h"
 #include "palpate/core/yaml_tree.h"
 
@@ -536,12 +537,18 @@ void read_settings(const YAML::Node& node, const SettingsContext& context, Setti
 YAML::Node load_settings_file(const std::filesystem::path& file) {
   if (const std::string obstacle = obstacle_to_reading(file); !obstacle.empty())
     throw BadInput(fmt::format("{} {}, expected a YAML scene file", file.string(), obstacle));
-  const std::string content = read_whole_file(file);
+  std::string content = read_whole_file(file);
+  if (has_byte_order_mark(content)) content = as_utf8(content);
   if (!is_text(content)) throw BadInput(fmt::format("{} is no text, expected a YAML scene file", file.string()));
   try {
-    YAML::Node root = YAML::Load(content);
-    require_tree(root);
-    return root;
+    const std::vector<YAML::Node> documents = load_documents(content);
+    for (size_t i = 1; i < documents.size(); ++i)
+      if (!documents[i].IsNull())
+        throw BadInput(fmt::format("{}: a second document begins here, after ---; expected one in a file",
+                                   place_of(documents[i], {file, {}})));
+    if (documents.empty()) return {};
+    require_closed_quotes(content, documents.front());
+    return documents.front();
   } catch (const YAML::Exception& error) {
     throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1, shown(error.msg)));
   }

@@ -50,7 +50,44 @@ void require_end(const std::string& text) {
                                   "the document ends here; what follows begins none (a bracket too many?)");
 }
 
+/// Where a value in quotes begins, its line after the first quote holds the second; '' and \" are none.
+bool closes(const std::string& line, size_t at) {
+  const char quote = line[at];
+  for (size_t i = at + 1; i < line.size(); ++i) {
+    if (line[i] == quote && quote == '\'' && i + 1 < line.size() && line[i + 1] == quote)
+      ++i;
+    else if (line[i] == quote)
+      return true;
+    else if (line[i] == '\\' && quote == '"')
+      ++i;
+  }
+  return false;
+}
+
+void require_closed_quotes(const std::vector<std::string>& lines, const YAML::Node& node) {
+  if (node.IsSequence())
+    for (const YAML::Node& item : node) require_closed_quotes(lines, item);
+  if (node.IsMap())
+    for (const auto& entry : node) {
+      require_closed_quotes(lines, entry.first);
+      require_closed_quotes(lines, entry.second);
+    }
+  const YAML::Mark mark = node.Mark();
+  const auto row = static_cast<size_t>(mark.line), column = static_cast<size_t>(mark.column);
+  if (!node.IsScalar() || mark.is_null() || row >= lines.size() || column >= lines[row].size()) return;
+  const char first = lines[row][column];
+  if ((first == '\'' || first == '"') && !closes(lines[row], column))
+    throw YAML::ParserException(mark, "a quote is opened and not closed in this line");
+}
+
 }  // namespace
+
+void require_closed_quotes(const std::string& text, const YAML::Node& document) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  require_closed_quotes(lines, document);
+}
 
 void require_tree(const YAML::Node& document) {
   int nodes = 0;

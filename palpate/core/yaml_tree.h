@@ -17,4 +17,9 @@ void require_tree(const YAML::Node& document);
 /// opened: yaml-cpp begins a new document there without end.
 std::vector<YAML::Node> load_documents(const std::string& text);
 
+/// Throws YAML::ParserException at a value in quotes that does not end in its line: yaml-cpp takes the lines after it
+/// for part of the value, and where they are indented less, ends it without its quote. For files whose values are
+/// words, numbers and paths.
+void require_closed_quotes(const std::string& text, const YAML::Node& document);
+
 }  // namespace palpate

@@ -174,7 +174,7 @@ std::string complaint_about_file(const std::string& content) {
     sentence = error.what();
   }
   std::filesystem::remove(file);
-  return sentence.substr(sentence.find("palpate_settings_test.yaml"));
+  return sentence == "nothing" ? sentence : sentence.substr(sentence.find("palpate_settings_test.yaml"));
 }
 
 TEST(Settings, AFileThatIsNoTextIsNotEchoed) {
@@ -187,6 +187,27 @@ TEST(Settings, AFileThatIsNoTextIsNotEchoed) {
               testing::StartsWith("palpate_settings_test.yaml:2: not valid YAML"));
   EXPECT_THAT(complaint_about_file("elements: &all [1, *all]\n"),
               testing::HasSubstr("not valid YAML: it is nested too"));
+}
+
+TEST(Settings, AQuoteThatIsNotClosedIsToldByItsLine) {
+  // yaml-cpp takes the lines below for part of the label and ends it without a word.
+  EXPECT_THAT(complaint_about_file("basket:\n  label: 'l_%02d.png\n  nothing: here\nelements: 3\n"),
+              testing::HasSubstr("yaml:2: not valid YAML: a quote is opened and not closed"));
+  EXPECT_THAT(complaint_about_file("basket: {label: \"plum\n  \"}\n"), testing::HasSubstr("yaml:1: not valid YAML"));
+  for (const char* label : {"'it''s'", "\"a \\\"plum\\\"\"", "it's", "''", "say \"plum"})
+    EXPECT_EQ(complaint_about_file(std::string("basket: {label: ") + label + "}\n"), "nothing") << label;
+}
+
+TEST(Settings, ASecondDocumentIsToldByItsLine) {
+  EXPECT_THAT(complaint_about_file("---\nelements: 800\n---\nelements: 3000\n"),
+              testing::StartsWith("palpate_settings_test.yaml:4: a second document begins here"));
+  EXPECT_EQ(complaint_about_file("---\nelements: 800\n---\n...\n"), "nothing");
+}
+
+TEST(Settings, AFileInUtf16IsRead) {
+  std::string utf16 = "\xFF\xFE";
+  for (const char c : std::string("elements: 5000000000\r\n")) utf16 += {c, '\0'};
+  EXPECT_THAT(complaint_about_file(utf16), testing::HasSubstr("yaml:1: elements is 5000000000"));
 }
 
 TEST(Settings, AMissingFileAndAFolderAreTold) {
