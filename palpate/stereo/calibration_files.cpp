@@ -43,6 +43,8 @@ void sort_in(Calibration& calibration) {
   refuse_zed(calibration);
   for (const CalibrationValue& value : recognised(calibration.entries)) {
     const CalibrationEntry& entry = *value.entry;
+    if (value.meant != Role::none)
+      calibration.misfits.push_back({value.meant, value.camera, misfit(entry, value.meant)});
     if (value.role != Role::none &&
         !std::all_of(entry.numbers.begin(), entry.numbers.end(), [](double number) { return std::isfinite(number); }))
       throw BadInput(fmt::format("{}: {} is [{:.6g}], expected finite numbers", calibration.file.string(), entry.path,
@@ -64,7 +66,7 @@ void sort_in(Calibration& calibration) {
 }
 
 Calibration calibration_of(const std::filesystem::path& file) {
-  Calibration calibration{file, read_calibration_tree(file), {}, false};
+  Calibration calibration{file, read_calibration_tree(file), {}, false, {}};
   sort_in(calibration);
   return calibration;
 }
@@ -117,6 +119,16 @@ void refuse(const Calibration& calibration, const std::string& why) {
   throw BadInput(fmt::format("{}: {}; {}", calibration.file.string(), why, keys_there(calibration.entries)));
 }
 
+void refuse_missing(const Calibration& calibration, CameraSide camera, const std::vector<Role>& roles,
+                    const std::string& why) {
+  for (const Misfit& unfit : calibration.misfits) {
+    const bool is_its = camera == CameraSide::unknown || unfit.camera == camera || unfit.camera == CameraSide::unknown;
+    if (is_its && std::find(roles.begin(), roles.end(), unfit.meant) != roles.end())
+      refuse(calibration, unfit.sentence);
+  }
+  refuse(calibration, why);
+}
+
 bool both_have(const Calibration& calibration, Role role) {
   return calibration.of(CameraSide::left).find(role) && calibration.of(CameraSide::right).find(role);
 }
@@ -145,6 +157,7 @@ Calibration whole_calibration(const std::filesystem::path& file) {
       calibration.entries.insert(calibration.entries.end(), more.begin(), more.end());
     }
     calibration.said = {};
+    calibration.misfits.clear();
     sort_in(calibration);
     return calibration;
   }
@@ -185,9 +198,9 @@ Calibration whole_calibration(const std::filesystem::path& file) {
     const auto extrinsics =
         first_there(file, {{"intrinsics", "extrinsics"}, {"intrinsic", "extrinsic"}, {"int", "ext"}});
     if (!extrinsics)
-      refuse(calibration,
-             "R and T are missing, and no extrinsics file stands beside it (the same name with extrinsics for "
-             "intrinsics); expected all of a stereo calibration, M1 D1 M2 D2 R T");
+      refuse_missing(calibration, CameraSide::unknown, {Role::rotation, Role::translation, Role::transform},
+                     "R and T are missing, and no extrinsics file stands beside it (the same name with extrinsics for "
+                     "intrinsics); expected all of a stereo calibration, M1 D1 M2 D2 R T");
     add_what_is_missing(calibration, calibration_of(*extrinsics));
   } else if (!has_camera(calibration.of(CameraSide::left)) || !has_camera(calibration.of(CameraSide::right)) ||
              !calibration.of(CameraSide::left).find(Role::camera_matrix)) {

@@ -28,11 +28,19 @@ struct Said {
   }
 };
 
+/// A value that is there and is not what its name says.
+struct Misfit {
+  CalibrationRole meant = CalibrationRole::none;
+  CameraSide camera = CameraSide::unknown;
+  std::string sentence;
+};
+
 struct Calibration {
   std::filesystem::path file;
   std::vector<CalibrationEntry> entries;
   std::array<Said, 3> said;  // by Camera
   bool by_matlab = false;
+  std::vector<Misfit> misfits;
 
   Said& of(CameraSide camera) { return said[static_cast<size_t>(camera)]; }
   const Said& of(CameraSide camera) const { return said[static_cast<size_t>(camera)]; }
@@ -40,6 +48,10 @@ struct Calibration {
 
 /// Throws BadInput with the reason and the keys that are there.
 [[noreturn]] void refuse(const Calibration& calibration, const std::string& why);
+
+/// The same where something of these kinds is missing: where it is there and unfit, that is the reason.
+[[noreturn]] void refuse_missing(const Calibration& calibration, CameraSide camera,
+                                 const std::vector<CalibrationRole>& roles, const std::string& why);
 
 /// Both cameras have a value of this kind.
 bool both_have(const Calibration& calibration, CalibrationRole role);

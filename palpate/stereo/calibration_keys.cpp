@@ -17,7 +17,7 @@ namespace palpate {
 namespace {
 
 using Role = CalibrationRole;
-constexpr size_t kMaxKeysShown = 16;
+constexpr size_t kMaxKeysShown = 16, kMaxTextShown = 60;
 
 bool is_upper(char c) {
   return std::isupper(static_cast<unsigned char>(c)) != 0;
@@ -61,12 +61,29 @@ struct Side {
   int number = -1;
 };
 
-/// Takes the words that name an camera out of `words`, unless nothing else would be left.
+/// "stereoleft" and "leftcamera" in small letters; "lefttoright" names a pair.
+Side side_within(std::string& word) {
+  const bool has_left = word.find("left") != std::string::npos, has_right = word.find("right") != std::string::npos;
+  const std::string name = has_left ? "left" : "right";
+  if (has_left == has_right || word.size() == name.size()) return {};
+  if (word.starts_with(name))
+    word.erase(0, name.size());
+  else if (word.ends_with(name))
+    word.erase(word.size() - name.size());
+  else
+    return {};
+  return {has_left ? CameraSide::left : CameraSide::right, -1};
+}
+
+/// Takes the words that name a camera out of `words`, unless nothing else would be left.
 Side take_side(std::vector<std::string>& words, bool may_be_empty) {
   Side side;
   std::vector<std::string> rest;
-  for (const std::string& word : words) {
-    if (word == "left" || word == "l" || word == "lft")
+  for (std::string word : words) {
+    if (const Side within = side_within(word); within.camera != CameraSide::unknown) {
+      side.camera = within.camera;
+      rest.push_back(word);
+    } else if (word == "left" || word == "l" || word == "lft")
       side.camera = CameraSide::left;
     else if (word == "right" || word == "r" || word == "rgt")
       side.camera = CameraSide::right;
@@ -194,12 +211,16 @@ Recognised recognise(const CalibrationEntry& entry) {
   Role role = found == roles.end() ? Role::none : found->second;
   if (entry.numbers.empty()) {
     result.value.role = role == Role::distortion_model ? role : Role::none;
+    result.value.meant = role == Role::distortion_model ? Role::none : role;
   } else if (role == Role::distortion_model) {
     result.value.role = role;
   } else {
+    const Role by_name = role;
     if (role == Role::distortion && entry.numbers.size() == 9) role = Role::none;
     if (name == "k" && entry.numbers.size() != 9 && entry.numbers.size() >= 4) role = Role::distortion;
     result.value.role = role == Role::distortion ? role : by_size(role, whole, entry.numbers.size());
+    const bool is_other = by_name == Role::camera_matrix && result.value.role == Role::distortion;
+    if (result.value.role == Role::none || is_other) result.value.meant = by_name;
     // R1 and P1 of cv::stereoRectify; RotationOfCamera2 is the one rotation there is.
     const bool numbered = own.number >= 0 || own.camera != CameraSide::unknown;
     if (result.value.role == Role::rotation && name == "r" && numbered && entry.numbers.size() == 9)
@@ -236,6 +257,23 @@ std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& en
   return values;
 }
 
+std::string misfit(const CalibrationEntry& entry, CalibrationRole meant) {
+  static const std::map<Role, std::string> kExpected = {
+      {Role::camera_matrix, "9 numbers (3x3), or fx fy cx cy"},
+      {Role::distortion, "4, 5, 8, 12 or 14 numbers"},
+      {Role::rotation, "9 numbers (3x3), or the 3 of a rotation vector"},
+      {Role::translation, "3 numbers"},
+      {Role::transform, "12 or 16 numbers (3x4 or 4x4)"},
+      {Role::projection, "12 numbers (3x4)"}};
+  const auto expected = kExpected.find(meant);
+  const size_t count = entry.numbers.size();
+  const std::string holds = count > 0            ? fmt::format("holds {} number{}", count, count == 1 ? "" : "s")
+                            : entry.text.empty() ? "is empty"
+                                                 : "holds " + entry.text.substr(0, kMaxTextShown);
+  return fmt::format("{} {}, expected {}", entry.path, holds,
+                     expected == kExpected.end() ? "a value of that kind" : expected->second);
+}
+
 std::string keys_there(const std::vector<CalibrationEntry>& entries) {
   static const std::vector<std::string> kExpected = {"M1",
                                                      "M2",
@@ -265,7 +303,7 @@ std::string keys_there(const std::vector<CalibrationEntry>& entries) {
   for (const CalibrationEntry& entry : entries) {
     if (shown.size() < kMaxKeysShown) shown.push_back(entry.path);
     if (!nearest.empty() || recognise(entry).value.role != Role::none) continue;
-    if (const std::string expected = nearest_word(entry.path, kExpected); !expected.empty())
+    if (const std::string expected = nearest_word(entry.path, kExpected); !expected.empty() && expected != entry.path)
       nearest = fmt::format("; '{}' is nearest to '{}'", entry.path, expected);
   }
   return fmt::format("the keys there are {}{}{}", fmt::join(shown, ", "), entries.size() > shown.size() ? ", ..." : "",

@@ -33,6 +33,7 @@ enum class CameraSide { unknown, left, right };
 
 struct CalibrationValue {
   CalibrationRole role = CalibrationRole::none;
+  CalibrationRole meant = CalibrationRole::none;  ///< what its name says, where what it holds does not fit
   CameraSide camera = CameraSide::unknown;
   std::string name;  ///< of a coefficient, in small letters
   const CalibrationEntry* entry = nullptr;
@@ -41,6 +42,9 @@ struct CalibrationValue {
 /// Told by its keys and its size: M1, K_left, LEFT.K, cameraMatrix1, KL, cam0.intrinsics, CameraParameters1.K ...
 /// Cameras that are numbered count from 0 or from 1, as the file as a whole shows.
 std::vector<CalibrationValue> recognised(const std::vector<CalibrationEntry>& entries);
+
+/// "M1 holds 8 numbers, expected 9 numbers (3x3)" of a value that does not fit its name.
+std::string misfit(const CalibrationEntry& entry, CalibrationRole meant);
 
 /// "the keys there are a, b, c; 'camra_matrix' is nearest to 'camera_matrix'", for sentences.
 std::string keys_there(const std::vector<CalibrationEntry>& entries);

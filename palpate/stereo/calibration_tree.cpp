@@ -7,6 +7,7 @@
 #include <boost/property_tree/ptree.hpp>
 #include <boost/property_tree/xml_parser.hpp>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <sstream>
 
@@ -41,7 +42,8 @@ struct Numbers {
 std::optional<double> number_in_calibration(std::string token) {
   std::transform(token.begin(), token.end(), token.begin(), [](unsigned char c) { return std::tolower(c); });
   if (token == ".nan" || token == "nan") return std::nan("");
-  if (token == ".inf" || token == "inf") return HUGE_VAL;
+  if (token == ".inf" || token == "inf" || token == "+.inf") return HUGE_VAL;
+  if (token == "-.inf" || token == "-inf") return -HUGE_VAL;
   if (token.back() == '.') token += '0';
   const double value = number_of(token);
   return std::isnan(value) ? std::nullopt : std::optional(value);
@@ -85,14 +87,23 @@ std::string without_remarks(const std::string& text) {
   return result;
 }
 
+/// The file is YAML, and one of two values would be left out.
+struct TwinKey : YAML::ParserException {
+  using YAML::ParserException::ParserException;
+};
+
 Node from_yaml(const YAML::Node& yaml, const std::string& key) {
   Node node{key, "", yaml.IsSequence(), {}};
   if (yaml.IsScalar()) node.text = yaml.Scalar();
   if (yaml.IsSequence())
     for (size_t i = 0; i < yaml.size(); ++i) node.children.push_back(from_yaml(yaml[i], fmt::format("[{}]", i)));
   if (yaml.IsMap())
-    for (const auto& child : yaml)
-      if (child.first.IsScalar()) node.children.push_back(from_yaml(child.second, child.first.Scalar()));
+    for (const auto& child : yaml) {
+      if (!child.first.IsScalar()) continue;
+      const std::string& name = child.first.Scalar();
+      if (node.child(name)) throw TwinKey(child.first.Mark(), name + " stands there twice, expected once");
+      node.children.push_back(from_yaml(child.second, name));
+    }
   return node;
 }
 
@@ -109,7 +120,7 @@ Node parse_yaml(const std::string& text) {
   std::string plain;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
-    if (!line.starts_with("%YAML")) plain += line + "\n";
+    plain += (line.starts_with("%YAML") ? "" : line) + "\n";  // lines keep their numbers
   std::replace(plain.begin(), plain.end(), '\t', ' ');
   Node root;
   for (const YAML::Node& document : load_documents(plain)) {
@@ -196,12 +207,21 @@ std::pair<std::string, std::string> pair_in(const std::string& line) {
   return {key, std::string(trimmed(std::string_view(line).substr(cut + 1)))};
 }
 
+/// "fc_x = 350 ; px" without its remark; the semicolon of "1 0 0 ; 0 1 0" ends a row.
+std::string without_remark(const std::string& line) {
+  for (size_t at = line.find_first_of(";#"); at != std::string::npos; at = line.find_first_of(";#", at + 1)) {
+    const bool is_apart = at == 0 || line[at - 1] == ' ' || line[at - 1] == '\t';
+    if (is_apart && (line[at] == '#' || !numbers_in(line.substr(at + 1)))) return line.substr(0, at);
+  }
+  return line;
+}
+
 /// The first line that is no remark is a [section].
 bool begins_with_section(const std::string& text) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
-    line = std::string(trimmed(line));
-    if (line.empty() || line.front() == ';' || line.front() == '#') continue;
+    line = std::string(trimmed(without_remark(line)));
+    if (line.empty()) continue;
     return !section_in(line).empty();
   }
   return false;
@@ -232,8 +252,8 @@ Node parse_text(const std::string& text, const std::string& name) {
   size_t row_length = 0;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
-    line = std::string(trimmed(line));
-    if (line.empty() || line.starts_with("//") || line.starts_with('#') || line.starts_with(';')) continue;
+    line = std::string(trimmed(without_remark(line)));
+    if (line.empty() || line.starts_with("//")) continue;
     if (const auto numbers = numbers_in(line)) {
       const bool continues = rows && numbers->values.size() == row_length && row_length > 1;
       if (!continues) rows = &add(section, heading);
@@ -293,6 +313,22 @@ std::optional<Numbers> numbers_of_node(const Node& node) {
   return all;
 }
 
+/// What spoils a list of numbers: a word among them, or rows of different length; empty where it is no such list.
+std::string spoiled_numbers(const Node& list) {
+  size_t numbers = 0, words = 0;
+  std::string first_word;
+  const std::function<void(const Node&)> count = [&](const Node& node) {
+    if (!node.children.empty() && !node.is_list) words += 1000;  // a group of keys
+    for (const Node& child : node.children) count(child);
+    if (!node.children.empty()) return;
+    if (numbers_in(node.text)) return void(++numbers);
+    if (words++ == 0) first_word = node.text;
+  };
+  count(list);
+  if (!list.is_list || words >= numbers || numbers < 2) return "";
+  return words > 0 ? fmt::format("'{}' among {} numbers", first_word, numbers) : "rows of different length";
+}
+
 void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>& entries) {
   gather_numbered(node);
   const auto add = [&](const Numbers& numbers, int rows) {
@@ -308,8 +344,11 @@ void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>&
       return add(*numbers,
                  stated && stated->values[0] > 0 && stated->values[0] < 1e6 ? static_cast<int>(stated->values[0]) : 0);
     }
+    if (const std::string what = spoiled_numbers(*data); !what.empty())
+      return entries.push_back({path, what, {}, 0, 0});
   }
   if (const auto numbers = numbers_of_node(node)) return add(*numbers, numbers->rows);
+  if (const std::string what = spoiled_numbers(node); !what.empty()) return entries.push_back({path, what, {}, 0, 0});
   if (node.children.empty() && !path.empty()) entries.push_back({path, node.text, {}, 0, 0});
   for (Node& child : node.children) {
     const bool is_index = child.key.starts_with('[');
@@ -317,11 +356,16 @@ void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>&
   }
 }
 
-/// "calib.left.intrinsic.txt" without the dots, which separate keys.
+/// "calib.left.intrinsic.txt" without the dots, which separate keys, and without what every such file ends with.
 std::string name_as_key(const std::filesystem::path& file) {
-  std::string name = file.filename().string();
+  std::string name = (file.extension() == ".txt" ? file.stem() : file.filename()).string();
   std::replace(name.begin(), name.end(), '.', '_');
   return name;
+}
+
+bool is_named_as_yaml(const std::filesystem::path& file) {
+  const std::filesystem::path extension = file.extension();
+  return extension == ".yaml" || extension == ".yml" || extension == ".json";
 }
 
 std::string content_of(const std::filesystem::path& file) {
@@ -356,12 +400,14 @@ void refuse_binary(const std::filesystem::path& file, const std::string& content
 std::vector<CalibrationEntry> read_calibration_tree(const std::filesystem::path& file) {
   const std::string content = content_of(file);
   refuse_binary(file, content);
-  std::string text = as_utf8(content);
+  std::string text = with_plain_minus(as_utf8(content));
   text.erase(std::remove(text.begin(), text.end(), '\r'), text.end());
   const size_t begin = text.find_first_not_of(" \t\n");
   const bool is_xml = begin != std::string::npos && text[begin] == '<';
   if (!is_xml) text = without_remarks(text);
   const std::string head = text.substr(0, 4096);
+  const bool looks_like_yaml =
+      head.find("%YAML") != std::string::npos || head.find("opencv-matrix") != std::string::npos;
   Node root;
   std::string why;
   try {
@@ -369,13 +415,15 @@ std::vector<CalibrationEntry> read_calibration_tree(const std::filesystem::path&
       root = parse_xml(text);
     else if (!begins_with_section(text))
       root = parse_yaml(text);
+  } catch (const TwinKey& error) {
+    throw BadInput(fmt::format("{}:{}: {}", file.string(), error.mark.line + 1, error.msg));
   } catch (const YAML::Exception& error) {
     why = error.what();
+    if (is_named_as_yaml(file) || looks_like_yaml)
+      throw BadInput(fmt::format("{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1, error.msg));
   } catch (const boost::property_tree::ptree_error& error) {
     throw BadInput(fmt::format("{}: the calibration cannot be read as XML ({})", file.string(), error.what()));
   }
-  const bool looks_like_yaml =
-      head.find("%YAML") != std::string::npos || head.find("opencv-matrix") != std::string::npos;
   if (root.children.empty() && !looks_like_yaml) root = parse_text(text, name_as_key(file));
   std::vector<CalibrationEntry> entries;
   flatten(root, "", entries);

@@ -1,12 +1,15 @@
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <optional>
+#include <sstream>
 
 #include "palpate/core/errors.h"
 #include "palpate/stereo/calibration_files.h"
@@ -65,15 +68,27 @@ bool is_transposed(const cv::Matx33d& K) {
 /// numbers are k1 k2 p1 p2.
 constexpr double kLargestTangential = 0.02, kUsualTangential = 0.01;
 
+/// "pinhole radtan": what the file calls the lens, word by word, in small letters.
+std::vector<std::string> lens_words(const Calibration& calibration, const Said& said) {
+  std::istringstream text(said.model + calibration.of(CameraSide::unknown).model);
+  return {std::istream_iterator<std::string>(text), {}};
+}
+
+/// Before anything of such a camera is read: its intrinsics are other numbers.
+void refuse_other_lenses(const Calibration& calibration, const Said& said, const char* camera) {
+  for (const std::string& word : lens_words(calibration, said))
+    for (const char* other : {"omni", "eucm", "ucm", "double_sphere", "double-sphere", "fov", "mei"})
+      if (word == "ds" || word.find(other) != std::string::npos)
+        refuse(calibration, fmt::format("the lens model of the {} camera is {}, expected plumb_bob (k1 k2 p1 p2 k3), "
+                                        "rational_polynomial or a fisheye model (equidistant, Kannala-Brandt)",
+                                        camera, word));
+}
+
 LensModel lens_of(const Calibration& calibration, const Said& said, const Numbers& D, const char* camera) {
   const std::string model = said.model + calibration.of(CameraSide::unknown).model;
   const auto says = [&model](std::initializer_list<const char*> words) {
     return std::any_of(words.begin(), words.end(), [&](const char* w) { return model.find(w) != std::string::npos; });
   };
-  if (says({"omni", "eucm", "double_sphere", "ds-none", "fov"}))
-    refuse(calibration, fmt::format("the lens model of the {} camera is{}, expected plumb_bob (k1 k2 p1 p2 k3), "
-                                    "rational_polynomial or a fisheye model (equidistant, Kannala-Brandt)",
-                                    camera, model));
   if (says({"fisheye", "equidistant", "kannala", "kb4", "equi"})) {
     if (D.size() != 4)
       refuse(calibration,
@@ -94,15 +109,29 @@ LensModel lens_of(const Calibration& calibration, const Said& said, const Number
              camera, D[2], D[3]));
 }
 
+/// fx, fy, cx without cy.
+void refuse_half_a_matrix(const Calibration& calibration, const Said& said, const char* camera) {
+  std::vector<std::string> there, missing;
+  for (const char* name : {"fx", "cx", "cy"})
+    (said.coefficients.count(name) || (name == std::string("fx") && said.coefficients.count("f")) ? there : missing)
+        .push_back(name);
+  if (there.empty()) return;
+  refuse(calibration, fmt::format("the {} camera has {} but no {}, expected fx, fy, cx, cy (or fc_x, fc_y, cc_x, cc_y)",
+                                  camera, fmt::join(there, ", "), fmt::join(missing, ", ")));
+}
+
 Camera camera_of(const Calibration& calibration, CameraSide side, StereoRig& rig) {
   const char* name = side == CameraSide::left ? "left" : "right";
   const int number = side == CameraSide::left ? 1 : 2;
   const Said& said = calibration.of(side);
+  refuse_other_lenses(calibration, said, name);
   const auto K = camera_matrix_of(said, calibration.of(CameraSide::unknown));
+  if (!K) refuse_half_a_matrix(calibration, said, name);
   if (!K)
-    refuse(calibration, fmt::format("no camera matrix of the {} camera, expected M{} (or K{}, cameraMatrix{}, "
-                                    "camera_matrix_{}, {}.K, cam{}.intrinsics ...)",
-                                    name, number, number, number, name, name, number - 1));
+    refuse_missing(calibration, side, {Role::camera_matrix, Role::intrinsics, Role::projection},
+                   fmt::format("no camera matrix of the {} camera, expected M{} (or K{}, cameraMatrix{}, "
+                               "camera_matrix_{}, {}.K, cam{}.intrinsics ...)",
+                               name, number, number, number, name, name, number - 1));
   Camera camera;
   camera.K = *K;
   const bool transposed = is_transposed(camera.K);
@@ -118,10 +147,14 @@ Camera camera_of(const Calibration& calibration, CameraSide side, StereoRig& rig
     camera.lens = lens_of(calibration, said, *D, name);
     if (camera.lens == LensModel::fisheye)
       rig.notes.push_back(fmt::format("{} camera: fisheye lens (Kannala-Brandt, k1 k2 k3 k4)", name));
-  } else if (!said.find(Role::projection) && !calibration.of(CameraSide::unknown).coefficients.count("baseline")) {
-    refuse(calibration, fmt::format("no distortion of the {} camera, expected D{} (or distCoeffs{}, "
-                                    "distortion_coefficients_{}, cam{}.distortion_coeffs ...)",
-                                    name, number, number, name, number - 1));
+  } else if (const auto words = lens_words(calibration, said);
+             !said.find(Role::projection) && !calibration.of(CameraSide::unknown).coefficients.count("baseline") &&
+             std::find(words.begin(), words.end(), "none") == words.end()) {
+    refuse_missing(calibration, side, {Role::distortion},
+                   fmt::format("no distortion of the {} camera, expected D{} (or distCoeffs{}, "
+                               "distortion_coefficients_{}, cam{}.distortion_coeffs ...; distortion_model: none where "
+                               "there is none)",
+                               name, number, number, name, number - 1));
   }
   return camera;
 }
@@ -191,7 +224,8 @@ Pose pose_of(const Calibration& calibration) {
   const Said &both = calibration.of(CameraSide::unknown), &left = calibration.of(CameraSide::left),
              &right = calibration.of(CameraSide::right);
   if (const auto pose = world_pose(both)) {
-    if (!both.find(Role::transform) && !both.find(Role::rotation)) refuse(calibration, "key R is missing");
+    if (!both.find(Role::transform) && !both.find(Role::rotation))
+      refuse_missing(calibration, CameraSide::unknown, {Role::rotation}, "key R is missing");
     return *pose;
   }
   const auto of_right = world_pose(right);
@@ -205,7 +239,8 @@ Pose pose_of(const Calibration& calibration) {
   if (both_have(calibration, Role::projection)) return pose_of_projections(left, right);
   if (both.coefficients.count("baseline"))
     return {Mat3::Identity(), Vec3(-std::abs(both.coefficient("baseline")), 0, 0)};
-  refuse(calibration, "no pose of the cameras to each other, expected R and T (x_right = R x_left + T)");
+  refuse_missing(calibration, CameraSide::unknown, {Role::rotation, Role::translation, Role::transform},
+                 "no pose of the cameras to each other, expected R and T (x_right = R x_left + T)");
 }
 
 // All distances below 0.2 are metres and all above 1 are millimetres, because a baseline is 1-200 mm.

@@ -331,6 +331,93 @@ TEST_F(CalibrationFile, ThatIsNotUnderstoodNamesItsKeysAndTheNearest) {
   EXPECT_THAT(refusal("c.npz", "PK\x03\x04"), HasSubstr("NumPy archive"));
 }
 
+std::string lists(const std::string& m1, const std::string& d1, const std::string& r, const std::string& t) {
+  return fmt::format("{{\"M1\": {}, \"D1\": {}, \"M2\": [{}], \"D2\": [{}], \"R\": {}, \"T\": {}}}", m1, d1, list(kK2),
+                     list(kD2), r, t);
+}
+
+TEST_F(CalibrationFile, WithAValueThatIsThereButUnfitSaysWhatItHolds) {
+  const std::string M = "[" + list(kK1) + "]", D = "[" + list(kD1) + "]", R = "[" + list(kR()) + "]",
+                    T = "[" + list(kT) + "]";
+  expect_the_pair("c.json", lists(M, D, R, T));
+  EXPECT_THAT(refusal("c.json", lists("[705, 0, 330, 0, 698, 232, 0, 0]", D, R, T)),
+              HasSubstr("M1 holds 8 numbers, expected 9 numbers (3x3)"));
+  EXPECT_THAT(refusal("c.json", lists("\"see other file\"", D, R, T)),
+              HasSubstr("M1 holds see other file, expected 9"));
+  EXPECT_THAT(refusal("c.json", lists("null", D, R, T)), HasSubstr("M1 is empty, expected 9 numbers"));
+  EXPECT_THAT(refusal("c.json", lists("3", D, R, T)), HasSubstr("M1 holds 1 number, expected 9 numbers"));
+  EXPECT_THAT(refusal("c.json", lists("[705, 0, 330, 0, abc, 232, 0, 0, 1]", D, R, T)),
+              HasSubstr("M1 holds 'abc' among 8 numbers, expected 9"));
+  EXPECT_THAT(refusal("c.json", lists("[[705, 0, 330], [0, 698], [0, 0, 1]]", D, R, T)),
+              HasSubstr("M1 holds rows of different length"));
+  EXPECT_THAT(refusal("c.json", lists(M, "null", R, T)), HasSubstr("D1 is empty, expected 4, 5, 8"));
+  EXPECT_THAT(refusal("c.json", lists(M, D, "[1, 0, 0, 0, 1, 0, 0, 0]", T)),
+              HasSubstr("R holds 8 numbers, expected 9 numbers (3x3)"));
+  EXPECT_THAT(refusal("c.json", lists(M, D, R, "[-5, 0]")), HasSubstr("T holds 2 numbers, expected 3"));
+  EXPECT_THAT(refusal("c.json", lists(M, D, R, "[-.Inf, 0, 0]")), HasSubstr("T is [-inf, 0, 0], expected finite"));
+  // A decimal comma makes one number two.
+  EXPECT_THAT(
+      refusal("c.yaml", "%YAML:1.0\n---\n" + matrix("M1", 3, {705, 0, 0, 330, 5, 0, 698, 0, 232, 5, 0, 0, 1, 0}) +
+                            matrix("D1", 1, kD1)),
+      HasSubstr("M1 holds 14 numbers"));
+}
+
+TEST_F(CalibrationFile, ThatIsNoYamlNamesTheLine) {
+  EXPECT_THAT(refusal("c.yaml", "%YAML:1.0\n---\nM1: [1, 2\nD1: {"), HasSubstr("c.yaml:4: not valid YAML"));
+  EXPECT_THAT(refusal("c.json", "{\"M1\": [1, 2,\n"), AllOf(HasSubstr("c.json:"), HasSubstr("not valid YAML")));
+}
+
+TEST_F(CalibrationFile, WithOneKeyTwiceIsRefused) {
+  EXPECT_THAT(refusal("c.yaml", file_storage("M1", "D1", "M2", "D2") + matrix("M1", 3, kK2)),
+              HasSubstr("M1 stands there twice, expected once"));
+  EXPECT_THAT(refusal("c.txt", "cam0: {K: [1, 2],\n K: [3]}\n"), HasSubstr("c.txt:2: K stands there twice"));
+}
+
+TEST_F(CalibrationFile, OfKalibrMayHaveNoDistortionAndNamesALensThatIsNotRead) {
+  const auto kalibr = [](const std::string& model, const std::string& distortion, const std::string& intrinsics) {
+    const std::string camera = fmt::format("  camera_model: {}\n  {}\n  intrinsics: [{}]\n  resolution: [640, 480]\n",
+                                           model, distortion, intrinsics);
+    return "cam0:\n" + camera + "cam1:\n  T_cn_cnm1: [[1, 0, 0, -0.0052], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n" +
+           camera;
+  };
+  const std::string none = "distortion_coeffs: []\n  distortion_model: none";
+  const StereoRig rig = read("k.yaml", kalibr("pinhole", none, "705, 698, 330, 232"));
+  EXPECT_NEAR(rig.baseline_mm(), 5.2, 1e-9);
+  EXPECT_LT(cv::norm(rig.left.K - cv::Matx33d(kK1.data())), 1e-9);
+  EXPECT_EQ(distorted(rig.left, {0.3, -0.2}), cv::Point2d(0.3, -0.2));
+  EXPECT_THAT(refusal("k.yaml", kalibr("pinhole", "distortion_coeffs: []", "705, 698, 330, 232")),
+              HasSubstr("cam0.distortion_coeffs is empty"));
+  for (const auto& [model, intrinsics] :
+       {std::pair{"ds", "-0.2, 0.59, 705, 698, 330, 232"}, std::pair{"eucm", "0.6, 1.1, 705, 698, 330, 232"},
+        std::pair{"omni", "1.6, 705, 698, 330, 232"}})
+    EXPECT_THAT(
+        refusal("k.yaml", kalibr(model, none, intrinsics)),
+        AllOf(HasSubstr(fmt::format("the lens model of the left camera is {},", model)), HasSubstr("plumb_bob")));
+}
+
+TEST_F(CalibrationFile, InSectionsMayHaveRemarksAndSmallLettersAndNamesWhatIsMissing) {
+  const auto ini = [](const char* side, const char* cy, const std::string& pose) {
+    return fmt::format(
+        "[{}] ; a camera\nfc_x=705 ; px\nfc_y=698 # px\ncc_x=330\n{}kc_0=0\nkc_1=0\nkc_2=0\nkc_3=0\nkc_4=0\n{}", side,
+        cy, pose);
+  };
+  const std::string pose = "r_0=1\nr_1=0\nr_2=0\nr_3=0\nr_4=1\nr_5=0\nr_6=0\nr_7=0\nr_8=1\nt_0=-5\nt_1=0\nt_2=0 ; mm\n";
+  const StereoRig rig =
+      read("c.ini", "; made by hand\n" + ini("stereoleft", "cc_y=232\n", "") + ini("stereoright", "cc_y=251\n", pose));
+  EXPECT_LT(cv::norm(rig.left.K - cv::Matx33d(kK1.data())), 1e-9);
+  EXPECT_NEAR(rig.right.K(1, 2), 251, 1e-9);
+  EXPECT_NEAR(rig.right_from_left_mm.x(), -5, 1e-9);
+  EXPECT_THAT(refusal("c.ini", ini("StereoLeft", "", "") + ini("StereoRight", "cc_y=251\n", pose)),
+              HasSubstr("the left camera has fx, cx but no cy"));
+}
+
+TEST_F(CalibrationFile, MayBeTwoFilesOfOneProjectionEach) {
+  folder_.write("camera_right.txt", "705 0 330 -3525\n0 705 232 0\n0 0 1 0\n");
+  const StereoRig rig = read("camera_left.txt", "705 0 330 0\n0 705 232 0\n0 0 1 0\n");
+  EXPECT_NEAR(rig.right_from_left_mm.x(), -5, 1e-9);
+  EXPECT_NEAR(rig.left.K(0, 2), 330, 1e-9);
+}
+
 TEST_F(CalibrationFile, WithARotationThatOneSignSpoilsNamesTheEntry) {
   Numbers R = kR();
   R[2] = -R[2];
