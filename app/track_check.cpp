@@ -54,11 +54,7 @@ void compare_as_stated(const SeenTips& seen, const TipTrack& track, const Instru
   int frames = 0;
   for (size_t i = 0; i < seen.tips.size(); ++i) {
     const SeenTip& tip = seen.tips[i];
-    std::optional<TipTrack::Row> row;
-    if (options.time_offset_s != 0)
-      row = row_at(track, tip.time_s + options.time_offset_s);
-    else if (const auto at = track.rows.find(seen.frames[i]); at != track.rows.end())
-      row = at->second;
+    const auto row = row_of_frame(track, seen.frames[i], tip.time_s, options.time_offset_s);
     if (!row) continue;
     squared += (options.camera_from_robot(row->tip_mm) - tip.tip_mm).squaredNorm();
     ++frames;

@@ -17,7 +17,7 @@ namespace palpate {
 
 namespace {
 
-constexpr double kLongestGap_s = 0.1;
+constexpr double kLongestGap_s = 0.1, kSameTime_s = 1e-3;
 constexpr double kNotARotation = 1e-3;
 constexpr size_t kMinFrames = 20;
 /// Of the frames in which a tip was seen, as many have to lie within the track's time.
@@ -136,13 +136,23 @@ TipTrack in_camera(TipTrack track, const CameraFromRobot& camera_from_robot) {
 std::optional<TipTrack::Row> row_at(const TipTrack& track, double track_time_s) {
   const auto later = [](double time_s, const auto& numbered) { return time_s < numbered.second.time_s; };
   auto after = std::upper_bound(track.rows.begin(), track.rows.end(), track_time_s, later);
-  if (after == track.rows.begin()) return {};
+  if (after == track.rows.begin()) {
+    const bool is_first = after != track.rows.end() && after->second.time_s - track_time_s <= kSameTime_s;
+    return is_first ? std::optional(after->second) : std::nullopt;
+  }
   const TipTrack::Row& a = std::prev(after)->second;
   if (a.time_s == track_time_s) return a;
+  if (after == track.rows.end() && track_time_s - a.time_s <= kSameTime_s) return a;
   if (after == track.rows.end() || after->second.time_s - a.time_s > kLongestGap_s) return {};
   const TipTrack::Row& b = after->second;
   const double t = (track_time_s - a.time_s) / (b.time_s - a.time_s);
   return TipTrack::Row{track_time_s, (1 - t) * a.tip_mm + t * b.tip_mm, t < 0.5 ? a.closed : b.closed};
+}
+
+std::optional<TipTrack::Row> row_of_frame(const TipTrack& track, int frame, double video_time_s, double time_offset_s) {
+  if (!track.has_frames || time_offset_s != 0) return row_at(track, video_time_s + time_offset_s);
+  const auto row = track.rows.find(frame);
+  return row == track.rows.end() ? std::nullopt : std::optional(row->second);
 }
 
 HandEye estimate_hand_eye(const std::vector<SeenTip>& seen, const TipTrack& track) {

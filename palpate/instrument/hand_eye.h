@@ -23,9 +23,13 @@ void describe(Settings& settings, CameraFromRobot& options);
 /// The track in the left camera frame.
 TipTrack in_camera(TipTrack track, const CameraFromRobot& camera_from_robot);
 
-/// What the track says at a moment of its own clock, between its rows; nothing outside of them, and where they lie
-/// further apart than a tenth of a second.
+/// What the track says at a moment of its own clock, between its rows; nothing outside of them (a ms is granted), and
+/// where they lie further apart than a tenth of a second.
 std::optional<TipTrack::Row> row_at(const TipTrack& track, double track_time_s);
+
+/// The row of a frame of the video: by its number, or by time where the track has no numbers or `time_offset_s` (track
+/// time minus video time) is not 0.
+std::optional<TipTrack::Row> row_of_frame(const TipTrack& track, int frame, double video_time_s, double time_offset_s);
 
 /// A tip that was seen in the video, left camera frame.
 struct SeenTip {

@@ -102,10 +102,7 @@ struct InstrumentTracker::State {
 };
 
 std::optional<TipTrack::Row> InstrumentTracker::State::row_of(const TipTrack& track, const RectifiedPair& pair) const {
-  if (time_offset_s != 0) return row_at(track, pair.time_s + time_offset_s);
-  const auto row = track.rows.find(pair.index);
-  if (row == track.rows.end()) return {};
-  return row->second;
+  return row_of_frame(track, pair.index, pair.time_s, time_offset_s);
 }
 
 std::array<FoundInstruments, 2> InstrumentTracker::State::find(const RectifiedPair& pair) {
@@ -282,8 +279,10 @@ void describe(Settings& settings, InstrumentOptions& options) {
   settings.path("track_2", options.track_2, "the same for a second instrument, with track");
   settings.group("camera_from_robot", "how the axes of the tracks lie; palpate check finds it",
                  [&options](Settings& group) { describe(group, options.camera_from_robot); });
-  settings.number("time_offset_s", options.time_offset_s, {},
-                  "time of the tracks minus time of the video; other than 0, rows are found by time, not by frame");
+  settings.number(
+      "time_offset_s", options.time_offset_s, {},
+      "time of the tracks minus time of the video; other than 0, or where a track has no column frame, rows are "
+      "found by time, not by frame");
   settings.after_reading([&options] {
     // A source is no file, and does not lie in the scene file's folder.
     if (const std::string source = options.track.parent_path().filename().string(); source.starts_with("openigtlink:"))
@@ -301,6 +300,21 @@ void describe(Settings& settings, InstrumentOptions& options) {
   });
 }
 
+namespace {
+
+/// A robot's clock since 1970 finds no row for any frame.
+void require_clock_of_video(const TipTrack& track, const std::filesystem::path& file, double video_s, double offset_s) {
+  constexpr double kLongestVideo_s = 86400;
+  const double begins_s = track.rows.begin()->second.time_s;
+  if (track.has_frames || std::abs(begins_s - offset_s - video_s) < kLongestVideo_s) return;
+  throw BadInput(fmt::format(
+      "{}: the track has no column frame and its time begins at {:.3f} s, the video's is {:.3f} s; expected "
+      "instrument.time_offset_s, the track's time minus the video's, which palpate check finds",
+      file.string(), begins_s, video_s));
+}
+
+}  // namespace
+
 InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rectification& rectification,
                                      const RectifiedPair& static_frame, const cv::Mat& organ_mask)
     : state_(std::make_unique<State>()) {
@@ -311,8 +325,11 @@ InstrumentTracker::InstrumentTracker(const InstrumentOptions& options, const Rec
   if (options.has_live_track() && !options.live_tip)
     throw BadInput("instrument.track is live, expected a run that streams (palpate estimate --realtime)");
   for (const std::filesystem::path& track : {options.track, options.track_2})
-    if (!track.empty() && !options.has_live_track())
-      state_->tracks.push_back(in_camera(read_tip_track(track), options.camera_from_robot));
+    if (!track.empty() && !options.has_live_track()) {
+      const TipTrack read = read_tip_track(track);
+      require_clock_of_video(read, track, static_frame.time_s, options.time_offset_s);
+      state_->tracks.push_back(in_camera(read, options.camera_from_robot));
+    }
   state_->time_offset_s = options.time_offset_s;
   std::array<std::optional<InstrumentFinder>, 2> finders;
   tbb::parallel_invoke([&] { finders[0].emplace(options, static_frame.left, organ_mask); },

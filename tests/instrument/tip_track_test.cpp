@@ -77,6 +77,61 @@ TEST_F(TipTrackFile, SaysWhichLineIsWrongAndWhy) {
   EXPECT_NE(complaint("frame,time_s,x_mm,y_mm,z_mm,closed\n0,0,1,2,3,2\n").find("closed"), std::string::npos);
 }
 
+TEST_F(TipTrackFile, WithoutFrameNumbersIsFoundByTime) {
+  const std::string text = "time_s,x_mm,y_mm,z_mm\n0,1,2,80\n0.02,1.5,2,80\n0.04,2,2,80\n0.06,2.5,2,80\n0.08,3,2,80\n";
+  const TipTrack track = read_tip_track(write(text));
+  EXPECT_FALSE(track.has_frames);
+  EXPECT_EQ(row_of_frame(track, 1, 0.04, 0)->tip_mm, Vec3(2, 2, 80));
+  EXPECT_EQ(row_of_frame(track, 2, 0.0800000001, 0)->tip_mm, Vec3(3, 2, 80));
+  EXPECT_NEAR(row_of_frame(track, 1, 0.04, 0.01)->tip_mm.x(), 2.25, 1e-9);
+  EXPECT_FALSE(row_of_frame(track, 3, 0.12, 0));
+  EXPECT_NE(complaint(text + "0.05,1,2,80\n").find(":7: time 0.05 s after 0.08 s"), std::string::npos);
+  EXPECT_NE(complaint("x_mm,y_mm,z_mm\n1,2,80\n").find("no column frame and none time_s"), std::string::npos);
+  const TipTrack numbered = read_tip_track(write(std::string(kHeader) + "4,0.5,1,2,80\n5,0.54,2,2,80\n"));
+  EXPECT_EQ(row_of_frame(numbered, 5, 0.2, 0)->tip_mm, Vec3(2, 2, 80));
+}
+
+TEST_F(TipTrackFile, OfARobotsOwnClockNeedsItsOffset) {
+  InstrumentOptions options;
+  options.track = write(
+      "%time,field.header.stamp,field.transform.rotation.x,field.transform.translation.x,"
+      "field.transform.translation.y,field.transform.translation.z\n"
+      "0,1700000000000000000,0.7,0.001,0.0025,0.06\n0,1700000000040000000,0.7,0.002,0.0025,0.061\n"
+      "0,1700000000080000000,0.7,0.003,0.0025,0.062\n");
+  const auto scene = test::draw_pair({.instrument = false}, {}, 0);
+  try {
+    InstrumentTracker(options, test::drawn_rectification(), scene, {});
+    ADD_FAILURE() << "a clock since 1970 was taken for the video's";
+  } catch (const BadInput& error) {
+    EXPECT_NE(std::string(error.what()).find("instrument.time_offset_s"), std::string::npos) << error.what();
+  }
+  options.time_offset_s = 1700000000;
+  InstrumentTracker tracker(options, test::drawn_rectification(), scene, {});
+  RectifiedPair pair = scene;
+  pair.index = 1;
+  pair.time_s = 0.04;
+  EXPECT_LT((tracker.update(pair).tips[0].tip_mm - Vec3(2, 2.5, 61)).norm(), 1e-4);
+}
+
+TEST_F(TipTrackFile, InMetresThatNoUnitStatesIsRefused) {
+  const std::string rows = "0,0,0.001,0.0025,0.06\n1,0.04,0.002,0.0025,0.061\n";
+  const std::string sentence = complaint("frame,time,x,y,z\n" + rows);
+  EXPECT_NE(sentence.find("x, y, z are 0.061 at most"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("x_m, y_m, z_m"), std::string::npos) << sentence;
+  for (const char* header : {"frame,time,x_m,y_m,z_m\n", "frame,time,x,y,z\n[-],[s],[m],[m],[m]\n",
+                             "frame,time,pose.position.x,pose.position.y,pose.position.z\n"})
+    EXPECT_LT((read_tip_track(write(header + rows)).rows.at(1).tip_mm - Vec3(2, 2.5, 61)).norm(), 1e-9) << header;
+  EXPECT_EQ(read_tip_track(write("frame,time,x_mm,y_mm,z_mm\n0,0,0.1,0.2,0.3\n")).rows.at(0).tip_mm.x(), 0.1);
+}
+
+TEST_F(TipTrackFile, ThatCountsFramesFromOneAtTimeZeroIsRefused) {
+  const std::string sentence = complaint(std::string(kHeader) + "1,0.00,1,2,60\n2,0.04,2,2,61\n");
+  EXPECT_NE(sentence.find(":2: frame 1 is at 0 s"), std::string::npos) << sentence;
+  EXPECT_EQ(complaint(std::string(kHeader) + "1,0.04,1,2,60\n2,0.08,2,2,61\n"), "");
+  EXPECT_NE(complaint(std::string(kHeader) + "0,0,1,2,60\n1,0.04,1,234.5,2,60\n").find("line 3 has 6 values"),
+            std::string::npos);
+}
+
 TEST_F(TipTrackFile, ReplacesTheImages) {
   InstrumentOptions options;
   options.track = write("frame,time_s,x_mm,y_mm,z_mm,closed\n1,0.04,1,2,80,0\n2,0.08,1.2,2,80,1\n4,0.16,2,2,81,1\n");
