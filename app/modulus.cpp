@@ -87,8 +87,7 @@ MeasuredModulus modulus_from_sensor(const std::vector<ForceRow>& estimated, doub
   if (std::none_of(estimated.begin(), estimated.end(), is_loaded))
     throw BadInput(
         fmt::format("the estimate has no force to compare {} with: {}", log.string(), contact_times(estimated)));
-  const double span_s = estimated.back().time_s - estimated.front().time_s;
-  const SensorComparison found = compare_with_sensor(estimated, read_sensor_log(log, span_s));
+  const SensorComparison found = compare_with_log(estimated, log);
   double peak_N = 0;
   for (const ForceRow& row : estimated) peak_N = std::max(peak_N, row.force_magnitude_N);
   std::vector<double> half_widths;

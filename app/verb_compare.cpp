@@ -11,6 +11,19 @@
 
 namespace palpate::app {
 
+namespace {
+
+Comparison compare_files(const std::filesystem::path& forces, const std::filesystem::path& truth) {
+  const std::vector<ForceRow> estimated = read_forces(forces), true_rows = read_truth(truth);
+  try {
+    return compare(estimated, true_rows);
+  } catch (const BadInput& error) {
+    throw BadInput(fmt::format("{} and {}: {}", truth.string(), forces.string(), error.what()));
+  }
+}
+
+}  // namespace
+
 void add_compare(CLI::App& app) {
   struct Arguments {
     std::filesystem::path forces, truth, sensor;
@@ -29,14 +42,12 @@ void add_compare(CLI::App& app) {
   verb->footer("Example: palpate compare results/forces.csv truth.csv");
   verb->callback([arguments] {
     if (!arguments->sensor.empty()) {
-      const std::vector<ForceRow> forces = read_forces(arguments->forces);
-      const double span_s = forces.empty() ? 0 : forces.back().time_s - forces.front().time_s;
-      const SensorComparison found = compare_with_sensor(forces, read_sensor_log(arguments->sensor, span_s));
+      const SensorComparison found = compare_with_log(read_forces(arguments->forces), arguments->sensor);
       fmt::print("{}", arguments->json ? json_success(nlohmann::ordered_json::parse(to_json(found))) : to_text(found));
       return;
     }
     if (arguments->truth.empty()) throw WrongUse("compare needs truth.csv, or --sensor with a sensor's log");
-    const Comparison comparison = compare(read_forces(arguments->forces), read_truth(arguments->truth));
+    const Comparison comparison = compare_files(arguments->forces, arguments->truth);
     fmt::print(
         "{}", arguments->json ? json_success(nlohmann::ordered_json::parse(to_json(comparison))) : to_text(comparison));
   });

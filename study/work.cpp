@@ -58,7 +58,7 @@ std::string missing_recording(const YAML::Node& scene) {
 /// As palpate compare --sensor; empty where there is no force to align.
 nlohmann::ordered_json against_sensor(const std::filesystem::path& forces, const std::filesystem::path& log) {
   try {
-    return nlohmann::ordered_json::parse(to_json(compare_with_sensor(read_forces(forces), read_sensor_log(log))));
+    return nlohmann::ordered_json::parse(to_json(compare_with_log(read_forces(forces), log)));
   } catch (const BadInput&) {
     return nlohmann::ordered_json::object();
   }

@@ -27,6 +27,8 @@ constexpr int kFineSteps = 6;
 constexpr double kMinOverlap = 0.5;
 /// Below, the log shows something else than the video.
 constexpr double kMinCorrelation = 0.5;
+/// A smaller factor between sensor and estimate was found in the noise of a sensor that nothing touches.
+constexpr double kMinScale = 1e-3;
 /// A rate that the file states and its stamps differ by no more than this, or the stamps hold.
 constexpr double kRateTolerance = 0.02;
 
@@ -39,17 +41,35 @@ std::vector<TableColumn> sensor_columns() {
   return columns;
 }
 
-/// ATI's Net F/T: counts for each N, and the unit behind them, stand before the table.
-double newtons_per_value(const Table& table, const std::vector<SensorReading>& readings) {
-  const auto is_whole = [](const SensorReading& reading) {
-    return reading.force_N == reading.force_N.array().round().matrix();
-  };
+/// Of all rows, before those of one time are averaged.
+bool are_whole_numbers(const Table& table) {
+  bool any = false;
+  for (const Table::Row& row : table.rows())
+    for (const char* column : {"fx_N", "fy_N", "fz_N"}) {
+      const double value = table.number(row, column);
+      if (std::isfinite(value) && value != std::round(value)) return false;
+      any = any || (std::isfinite(value) && value != 0);
+    }
+  return any;
+}
+
+/// ATI's Net F/T: counts for each N, and the unit behind them, stand before the table. Throws BadInput where the values
+/// are counts and how many are a newton is not said.
+double newtons_per_value(const Table& table) {
+  const bool is_whole = are_whole_numbers(table);
   double factor = 1;
   if (const auto name = table.before_header({"force", "unit"}); name && table.stated_unit("fx_N").empty())
     if (const auto unit = unit_of(*name); unit && unit->kind == Unit::Kind::force) factor = unit->factor;
   const auto counts = table.before_header({"count", "force"});
   const double per_unit = counts ? number_of(*counts) : 0;
-  if (per_unit > 0 && std::all_of(readings.begin(), readings.end(), is_whole)) factor /= per_unit;
+  if (is_whole && table.has("sequence") && table.stated_unit("fx_N").empty() && !(per_unit > 0))
+    throw BadInput(fmt::format(
+        "{}:{}: fx_N is '{}' beside an RDT Sequence, and all forces are whole numbers: counts of a Net F/T; "
+        "expected a line 'Counts per Unit Force: 1000000' before the header, with the sensor's own number; "
+        "{}",
+        table.file().string(), table.rows().front().line, table.text(table.rows().front(), "fx_N"),
+        table.header_found()));
+  if (is_whole && per_unit > 0) factor /= per_unit;
   return factor;
 }
 
@@ -140,7 +160,9 @@ double best_delay_s(const std::vector<ForceRow>& estimate, const std::vector<Sen
       best = delay_s;
     }
   if (best_correlation <= -2)
-    throw BadInput("the sensor's log and the estimate overlap by less than half of the video at any delay");
+    throw BadInput(
+        fmt::format("the sensor's log lasts {:g} s and covers less than half of the {:g} s of video at any delay",
+                    sensor.back().time_s - sensor.front().time_s, estimate.back().time_s - estimate.front().time_s));
   return best;
 }
 
@@ -158,8 +180,8 @@ std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, do
                                 {table.number(row, "fx_N"), table.number(row, "fy_N"), table.number(row, "fz_N")}};
     if (!std::isfinite(reading.time_s) || !reading.force_N.allFinite()) continue;
     if (!readings.empty() && reading.time_s < readings.back().time_s)
-      throw BadInput(fmt::format("{}:{}: time {:.15g} s after {:.15g} s, expected time that grows", file.string(),
-                                 row.line, reading.time_s, readings.back().time_s));
+      throw BadInput(fmt::format("{}:{}: time {:.15g} s after {:.15g} s, expected time that grows; {}", file.string(),
+                                 row.line, reading.time_s, readings.back().time_s, table.header_found()));
     if (!readings.empty() && reading.time_s == readings.back().time_s) {
       ++of_same_time;
       readings.back().force_N += (reading.force_N - readings.back().force_N) / of_same_time;
@@ -171,7 +193,7 @@ std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, do
   if (readings.size() < kMinReadings)
     throw BadInput(fmt::format("{}: {} rows with a time of their own and three forces, expected at least {}; {}",
                                file.string(), readings.size(), kMinReadings, table.header_found()));
-  const double factor = newtons_per_value(table, readings);
+  const double factor = newtons_per_value(table);
   for (SensorReading& reading : readings) reading.force_N *= factor;
   return readings;
 }
@@ -200,6 +222,12 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   }
   if (result.sensor_peak_N <= 0) throw BadInput("the sensor's log shows no force");
   result.scale = along / squared;
+  if (!(result.scale >= kMinScale))
+    throw BadInput(
+        fmt::format("the sensor's log follows the estimate best at {:+.3f} s, where it shows no more than {:.3g} N and "
+                    "the estimate has to be multiplied by {:.2g}, expected a factor of at least {:g}; is it the log of "
+                    "this recording, and in N?",
+                    result.delay_s, result.sensor_peak_N, result.scale, kMinScale));
   for (size_t i = 0; i < pairs.estimate_N.size(); ++i) {
     const Vec3 turned = result.camera_from_sensor * pairs.sensor_N[i];
     result.rmse_N += (pairs.estimate_N[i] - turned).squaredNorm();
@@ -210,6 +238,16 @@ SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, cons
   result.nrmse_pct = 100 * result.rmse_N / result.sensor_peak_N;
   result.nrmse_scaled_pct = 100 * result.rmse_scaled_N / result.sensor_peak_N;
   return result;
+}
+
+SensorComparison compare_with_log(const std::vector<ForceRow>& estimate, const std::filesystem::path& log) {
+  const double span_s = estimate.empty() ? 0 : estimate.back().time_s - estimate.front().time_s;
+  const std::vector<SensorReading> readings = read_sensor_log(log, span_s);
+  try {
+    return compare_with_sensor(estimate, readings);
+  } catch (const BadInput& error) {
+    throw BadInput(fmt::format("{}: {}", log.string(), error.what()));
+  }
 }
 
 std::vector<SensorReading> aligned(const std::vector<SensorReading>& sensor, const SensorComparison& found) {

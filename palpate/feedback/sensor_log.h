@@ -19,7 +19,7 @@ struct SensorReading {
 /// A table with a time and fx, fy, fz as sensors' programs write it (`Table`): ours, ATI's with counts and rate before
 /// the table, rostopic's and a robot's (`field.wrench.force.x`). `video_span_s` helps to tell the unit of its time; 0 =
 /// not known. Rows of the same time are averaged. Throws BadInput where a column is missing, fewer than ten rows have
-/// numbers, the unit of the time cannot be told, or the time runs backwards.
+/// numbers, the unit of the time cannot be told, the time runs backwards, or ATI's counts lack their factor.
 std::vector<SensorReading> read_sensor_log(const std::filesystem::path& file, double video_span_s = 0);
 
 /// How an estimate compares with a sensor whose clock and axes are not known: clock by the delay at which the
@@ -40,8 +40,11 @@ struct SensorComparison {
 };
 
 /// Throws BadInput where they overlap by less than half of the video, where no force is to be seen in one of them, or
-/// where the magnitudes correlate by less than 0.5 at any delay.
+/// where the magnitudes correlate by less than 0.5 at any delay, or with a factor of nearly 0.
 SensorComparison compare_with_sensor(const std::vector<ForceRow>& estimate, const std::vector<SensorReading>& sensor);
+
+/// The same with a log as it lies there; the sentences name it.
+SensorComparison compare_with_log(const std::vector<ForceRow>& estimate, const std::filesystem::path& log);
 
 /// The log in the video's time and the left camera frame, less its zero.
 std::vector<SensorReading> aligned(const std::vector<SensorReading>& sensor, const SensorComparison& found);

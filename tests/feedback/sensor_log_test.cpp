@@ -120,6 +120,37 @@ TEST_F(SensorLogFile, OfAtisNetFtHoldsCountsAndATimeOfDay) {
   expect_followed(counted);
 }
 
+TEST_F(SensorLogFile, OfAtisNetFtWithoutItsCountsPerForceIsRefused) {
+  const auto row = [](const char* format) {
+    return [format](int i, double time_s, const Vec3& f) {
+      return fmt::format(fmt::runtime(format), 4000 + 7 * i, f.x() * 1e6, f.y() * 1e6, f.z() * 1e6, time_s);
+    };
+  };
+  const char* header = "RDT Sample Rate: 100\nForce Units: N\nRDT Sequence, Fx, Fy, Fz, Time";
+  EXPECT_THAT([&] { read(header, row("{},{:.0f},{:.0f},{:.0f},{}")); },
+              testing::ThrowsMessage<BadInput>(testing::AllOf(testing::HasSubstr("fx_N is '0' beside an RDT Sequence"),
+                                                              testing::HasSubstr("Counts per Unit Force"),
+                                                              testing::HasSubstr("the header in line 3"))));
+  EXPECT_EQ(read(header, row("{},{:.3f},{:.3f},{:.3f},{}")).size(), 600U);
+  EXPECT_EQ(read("RDT Sequence, Fx (N), Fy (N), Fz (N), Time", row("{},{:.0f},{:.0f},{:.0f},{}")).size(), 600U);
+}
+
+TEST_F(SensorLogFile, OfCountsIsDividedWhereTwoRowsOfOneTimeAreAveraged) {
+  std::string text = "Counts per Unit Force: 1000\nTime (s), Fx, Fy, Fz\n";
+  for (int i = 0; i < 20; ++i) text += fmt::format("{},1000,0,0\n{},1001,0,0\n", 0.02 * i, 0.02 * i);
+  std::ofstream(file_) << text;
+  EXPECT_NEAR(read_sensor_log(file_).front().force_N.x(), 1.0005, 1e-9);
+}
+
+TEST_F(SensorLogFile, OfALoggerThatWritesWholeSecondsOrMsBehindAColonIsFollowed) {
+  expect_followed(read("Time,Fx,Fy,Fz", [](int i, double, const Vec3& f) {
+    return fmt::format("13:53:{:02}:{:03},{},{},{}", 20 + i / 100, 10 * (i % 100), f.x(), f.y(), f.z());
+  }));
+  expect_followed(read("Time,Fx,Fy,Fz", [](int i, double, const Vec3& f) {
+    return fmt::format("13:53:{:02},{},{},{}", 20 + i / 100, f.x(), f.y(), f.z());
+  }));
+}
+
 TEST_F(SensorLogFile, OfARobotOrOfALoggerWithItsOwnClock) {
   expect_followed(
       read("%time,field.header.seq,field.header.stamp,field.header.frame_id,field.wrench.force.x,field.wrench.force.y,"
@@ -152,6 +183,11 @@ TEST_F(SensorLogFile, SaysWhatIsMissing) {
   EXPECT_THAT(refusal("Status,Time,Fx,Fy,Force\nok,0,1,2,3\n"),
               testing::AllOf(testing::HasSubstr("no column fz_N"), testing::HasSubstr("Status,Time,Fx,Fy,Force")));
   EXPECT_THAT(refusal("Time,Fx,Fy,Fz\n0,1,2,3\n"), testing::HasSubstr("expected at least 10"));
+  std::string short_log = "Time,Fx,Fy,Fz\n";
+  for (int i = 0; i < 20; ++i) short_log += fmt::format("{},{},2,3\n", 0.01 * i, i);
+  std::ofstream(file_) << short_log;
+  EXPECT_THAT([&] { compare_with_log(video(), file_); },
+              testing::ThrowsMessage<BadInput>(testing::HasSubstr(file_.string())));
 }
 
 TEST(SensorLog, OfAnotherRecordingIsRefused) {
@@ -161,6 +197,13 @@ TEST(SensorLog, OfAnotherRecordingIsRefused) {
   for (int i = 0; i < 2000; ++i) log.push_back({i / 100.0, Vec3(normal(random), normal(random), normal(random))});
   EXPECT_THAT([&] { compare_with_sensor(video(), log); },
               testing::ThrowsMessage<BadInput>(testing::HasSubstr("does not follow the estimate")));
+}
+
+TEST(SensorLog, ThatFollowsOnlyWithAFactorOfNearlyZeroIsRefused) {
+  std::vector<SensorReading> log = log_of(Mat3::Identity(), Vec3::Zero(), 0);
+  for (SensorReading& reading : log) reading.force_N *= 1e-4;
+  EXPECT_THAT([&] { compare_with_sensor(video(), log); },
+              testing::ThrowsMessage<BadInput>(testing::HasSubstr("has to be multiplied by 0.00017")));
 }
 
 TEST(SensorLog, AnEstimateWithoutForceOrALogOfAnotherTimeCannotBeCompared) {
