@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/errors.h"
+#include "palpate/core/quantile.h"
 
 namespace palpate {
 namespace {
@@ -38,8 +39,36 @@ std::map<int, ForceRow> by_frame(const std::vector<ForceRow>& rows) {
   return result;
 }
 
+/// Frames that one table counts from 1 and the other from 0 would be paired one off. Where both begin with the same
+/// number, only their clocks differ.
+void require_same_numbers(const std::map<int, ForceRow>& estimates, const std::map<int, ForceRow>& truths) {
+  if (estimates.size() < 2 || truths.empty() || estimates.begin()->first == truths.begin()->first) return;
+  const auto has_times = [](const std::map<int, ForceRow>& rows) {
+    return std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.second.time_s != 0; });
+  };
+  if (!has_times(estimates) || !has_times(truths)) return;
+  const ForceRow &first = estimates.begin()->second, &last = estimates.rbegin()->second;
+  const double step_s = (last.time_s - first.time_s) / (last.frame - first.frame);
+  std::vector<double> differences;
+  const ForceRow* seen = nullptr;
+  for (const auto& [frame, row] : truths)
+    if (const auto found = estimates.find(frame); found != estimates.end()) {
+      differences.push_back((row.time_s - found->second.time_s) / step_s);
+      if (!seen) seen = &row;
+    }
+  if (!seen || !(step_s > 0)) return;
+  const double frames = quantile_of(differences, 0.5);
+  constexpr double kWhole = 0.25;
+  if (std::abs(frames) < 1 - kWhole || std::abs(frames - std::round(frames)) > kWhole) return;
+  throw BadInput(fmt::format(
+      "line {} of the truth has frame {} at {:g} s, which the estimate has at {:g} s, and its first frame, "
+      "{}, at {:g} s; expected frames of the same time to have the same number, counted from {}",
+      seen->line, seen->frame, seen->time_s, estimates.at(seen->frame).time_s, first.frame, first.time_s, first.frame));
+}
+
 Pairing pair_up(const std::vector<ForceRow>& estimate, const std::vector<ForceRow>& truth) {
   const std::map<int, ForceRow> estimates = by_frame(estimate), truths = by_frame(truth);
+  require_same_numbers(estimates, truths);
   const Eigen::Index n = static_cast<Eigen::Index>(truths.size());
   Pairing p;
   p.true_force = p.force = Eigen::VectorXd::Zero(n);

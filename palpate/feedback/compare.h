@@ -50,7 +50,8 @@ struct Comparison {
   std::optional<double> band_half_width_pct;  ///< mean, of the true peak
 };
 
-/// Throws BadInput when the truth is empty or a magnitude in it is not finite.
+/// Throws BadInput when the truth is empty, a magnitude in it is not finite, or its frames are numbered otherwise than
+/// the estimate's by the times of both, from 1 instead of from 0.
 Comparison compare(const std::vector<ForceRow>& estimate, const std::vector<ForceRow>& truth);
 
 /// One figure by its name; std::monostate where nothing can be said.

@@ -48,8 +48,8 @@ std::string joined(const std::vector<std::string>& words) {
 int frame_of(const Table& table, const Table::Row& row, const std::filesystem::path& file) {
   const double frame = table.number(row, "frame");
   if (!(std::abs(frame) < std::numeric_limits<int>::max()))
-    throw BadInput(fmt::format("{}, line {}: column frame is \"{}\", expected a number", file.string(), row.line,
-                               table.text(row, "frame")));
+    throw BadInput(fmt::format("{}, line {}: column frame is \"{}\", expected a number; {}", file.string(), row.line,
+                               table.text(row, "frame"), table.header_found()));
   return static_cast<int>(frame);
 }
 
@@ -60,6 +60,7 @@ ForceRow parse_row(const Table& table, const Table::Row& line, const std::filesy
   };
   ForceRow row;
   row.frame = frame_of(table, line, file);
+  row.line = line.line;
   row.time_s = finite_or(number("time_s"), 0);
   row.status = table.text(line, "status");
   row.in_contact = number("in_contact") > 0.5;

@@ -15,6 +15,7 @@ namespace palpate {
 /// One row of forces.csv or truth.csv. Forces of the instrument on the tissue, left camera frame.
 struct ForceRow {
   int frame = 0;
+  int line = 0;  ///< of the file that it was read from
   double time_s = 0;
   std::string status;  ///< "" where the file names none (truth.csv)
   bool in_contact = false;

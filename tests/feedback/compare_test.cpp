@@ -1,5 +1,6 @@
 #include "palpate/feedback/compare.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <limits>
@@ -49,6 +50,25 @@ class Compare : public test::TemporaryFolder {
     return compare(read_forces(file("forces.csv")), read_forces(file("truth.csv")));
   }
 };
+
+/// Rows of so many frames from `first`, with a time of their own.
+std::string counted_rows(int first, double begin_s, int frames) {
+  std::string text = "frame,time_s,force_N\n";
+  for (int i = 0; i < frames; ++i) text += fmt::format("{},{:.4f},{}\n", first + i, begin_s + 0.04 * i, i);
+  return text;
+}
+
+TEST_F(Compare, RefusesFramesThatTheTruthCountsFromOneByTheirTimes) {
+  const std::string estimate = counted_rows(0, 0, 9);
+  EXPECT_THAT(
+      [&] { compared(estimate, counted_rows(1, 0, 9)); },
+      testing::ThrowsMessage<BadInput>(testing::AllOf(testing::HasSubstr("line 2 of the truth has frame 1 at 0 s"),
+                                                      testing::HasSubstr("the estimate has at 0.04 s"))));
+  // A part of the frames, another clock, and no times at all contradict nothing.
+  EXPECT_NEAR(compared(estimate, counted_rows(3, 0.12, 4)).force_rmse_N, 3, 1e-9);
+  EXPECT_NEAR(compared(estimate, counted_rows(0, 1.4, 9)).force_rmse_N, 0, 1e-9);
+  EXPECT_NEAR(compared(estimate, "frame,force_N\n1,1\n2,2\n").force_rmse_N, 0, 1e-9);
+}
 
 TEST_F(Compare, GivesTheFiguresOfTheReferenceScorer) {
   // Printed by the reference scorer for the same two files.
