@@ -267,9 +267,10 @@ std::string misfit(const CalibrationEntry& entry, CalibrationRole meant) {
       {Role::projection, "12 numbers (3x4)"}};
   const auto expected = kExpected.find(meant);
   const size_t count = entry.numbers.size();
-  const std::string holds = count > 0            ? fmt::format("holds {} number{}", count, count == 1 ? "" : "s")
-                            : entry.text.empty() ? "is empty"
-                                                 : "holds " + entry.text.substr(0, kMaxTextShown);
+  std::string holds = "holds " + entry.text.substr(0, kMaxTextShown);
+  if (!entry.is_spoiled)
+    holds = entry.text.empty() ? "is empty" : "holds '" + entry.text.substr(0, kMaxTextShown) + "'";
+  if (count > 0) holds = fmt::format("holds {} number{}", count, count == 1 ? "" : "s");
   return fmt::format("{} {}, expected {}", entry.path, holds,
                      expected == kExpected.end() ? "a value of that kind" : expected->second);
 }

@@ -333,7 +333,7 @@ void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>&
   gather_numbered(node);
   const auto add = [&](const Numbers& numbers, int rows) {
     const bool fits = rows > 0 && numbers.values.size() % static_cast<size_t>(rows) == 0;
-    CalibrationEntry entry{path, "", numbers.values, fits ? rows : numbers.rows, 0};
+    CalibrationEntry entry{path, "", numbers.values, fits ? rows : numbers.rows, 0, false};
     entry.cols = static_cast<int>(numbers.values.size()) / entry.rows;
     entries.push_back(std::move(entry));
   };
@@ -345,11 +345,12 @@ void flatten(Node& node, const std::string& path, std::vector<CalibrationEntry>&
                  stated && stated->values[0] > 0 && stated->values[0] < 1e6 ? static_cast<int>(stated->values[0]) : 0);
     }
     if (const std::string what = spoiled_numbers(*data); !what.empty())
-      return entries.push_back({path, what, {}, 0, 0});
+      return entries.push_back({path, what, {}, 0, 0, true});
   }
   if (const auto numbers = numbers_of_node(node)) return add(*numbers, numbers->rows);
-  if (const std::string what = spoiled_numbers(node); !what.empty()) return entries.push_back({path, what, {}, 0, 0});
-  if (node.children.empty() && !path.empty()) entries.push_back({path, node.text, {}, 0, 0});
+  if (const std::string what = spoiled_numbers(node); !what.empty())
+    return entries.push_back({path, what, {}, 0, 0, true});
+  if (node.children.empty() && !path.empty()) entries.push_back({path, node.text, {}, 0, 0, false});
   for (Node& child : node.children) {
     const bool is_index = child.key.starts_with('[');
     flatten(child, path.empty() || is_index ? path + child.key : path + "." + child.key, entries);

@@ -13,6 +13,7 @@ struct CalibrationEntry {
   std::vector<double> numbers;  ///< row by row
   int rows = 0;
   int cols = 0;
+  bool is_spoiled = false;  ///< a list of numbers but for what `text` says
 };
 
 /// Every value of a YAML, XML, JSON, INI or plain text file: OpenCV's FileStorage in its three forms, what yaml and

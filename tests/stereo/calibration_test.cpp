@@ -343,7 +343,7 @@ TEST_F(CalibrationFile, WithAValueThatIsThereButUnfitSaysWhatItHolds) {
   EXPECT_THAT(refusal("c.json", lists("[705, 0, 330, 0, 698, 232, 0, 0]", D, R, T)),
               HasSubstr("M1 holds 8 numbers, expected 9 numbers (3x3)"));
   EXPECT_THAT(refusal("c.json", lists("\"see other file\"", D, R, T)),
-              HasSubstr("M1 holds see other file, expected 9"));
+              HasSubstr("M1 holds 'see other file', expected 9"));
   EXPECT_THAT(refusal("c.json", lists("null", D, R, T)), HasSubstr("M1 is empty, expected 9 numbers"));
   EXPECT_THAT(refusal("c.json", lists("3", D, R, T)), HasSubstr("M1 holds 1 number, expected 9 numbers"));
   EXPECT_THAT(refusal("c.json", lists("[705, 0, 330, 0, abc, 232, 0, 0, 1]", D, R, T)),
