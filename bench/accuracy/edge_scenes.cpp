@@ -202,12 +202,17 @@ std::string picture_name(const std::string& name) {
 void write_picture(const std::filesystem::path& folder, const EdgeScene& scene, const Rectification& rectification,
                    const TissueMap& map) {
   const cv::Mat preview = draw_map_preview(scene.frame.left, rectification, map);
-  const cv::Mat mesh = preview({0, 0, preview.cols / 2, preview.rows / 2}),
+  // The first of four panels; beside those to the right stands a colour bar.
+  const int height = preview.rows / 2, width = height * scene.frame.left.cols / scene.frame.left.rows;
+  const cv::Mat mesh = preview({0, 0, width, height}),
                 confidence = draw_map_confidence(scene.frame.left, rectification, map);
   cv::Mat left, right, both;
-  const cv::Size size(640, 360);
-  cv::resize(mesh, left, size, 0, 0, cv::INTER_AREA);
-  cv::resize(confidence, right, size, 0, 0, cv::INTER_AREA);
+  constexpr int kHeight_px = 360;
+  const auto at_height = [](const cv::Mat& picture) {
+    return cv::Size(picture.cols * kHeight_px / picture.rows, kHeight_px);
+  };
+  cv::resize(mesh, left, at_height(mesh), 0, 0, cv::INTER_AREA);
+  cv::resize(confidence, right, at_height(confidence), 0, 0, cv::INTER_AREA);
   cv::hconcat(left, right, both);
   std::filesystem::create_directories(folder);
   cv::imwrite((folder / picture_name(scene.name)).string(), both, {cv::IMWRITE_JPEG_QUALITY, 85});
