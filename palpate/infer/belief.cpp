@@ -78,8 +78,6 @@ Belief without_contact(const Belief& belief, size_t contact) {
 void forget(const Belief& before, Eigen::Index at, Eigen::Index count, Belief& now) {
   if (before.mean.size() != now.mean.size()) return;
   now.mean.segment(at, count) = before.mean.segment(at, count);
-  now.covariance.middleRows(at, count).setZero();
-  now.covariance.middleCols(at, count).setZero();
   now.covariance.block(at, at, count, count) = before.covariance.block(at, at, count, count);
 }
 

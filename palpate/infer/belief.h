@@ -49,8 +49,9 @@ Belief with_contact(const Belief& belief, const ContactPrior& prior);
 /// The rest of it, whatever this contact's unknowns are.
 Belief without_contact(const Belief& belief, size_t contact);
 
-/// Some unknowns of `now` as they were believed `before`, independent of the rest: what a frame said of them is not
-/// learned. Beliefs of another size stay as they are.
+/// Some unknowns of `now` as they were believed `before`: what a frame said of them is not learned. What the others owe
+/// to them stays (Schmidt's filter, which considers parameters that it does not estimate). Beliefs of another size stay
+/// as they are.
 void forget(const Belief& before, Eigen::Index at, Eigen::Index count, Belief& now);
 
 }  // namespace palpate

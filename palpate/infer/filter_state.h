@@ -25,7 +25,7 @@ struct Hand {
   int frames_expected = 0;            ///< until a touch elsewhere may be expected
   SceneMotion free_scene;             ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();   ///< the offset with which the patch was laid
-  Vec3 learned_at_mm = Vec3::Zero();  ///< q of the last frame that told the radius
+  Vec3 learned_at_mm = Vec3::Zero();  ///< q of the last frame that the slow unknowns were learned from
 };
 
 /// A frame's answer from which radius and place of these instruments' patches are to be laid anew.

@@ -35,7 +35,7 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("log_radius_walk", p.log_radius_walk, {0, 100}, "random walk of the log radius per sqrt(s)");
   settings.number("telling_force", p.telling_force, {0, 1000}, "the radius is learned at so many deviations of force");
   settings.number("new_pose", p.new_pose, {0, 10},
-                  "and where the patch's displacement has changed by this ratio since");
+                  "change of the patch's displacement, ratio to it, before radius and offset are learned again");
   settings.number("touch_per_s", p.touch_per_s, positive, "rate at which a free tip begins to touch");
   settings.number("release_per_s", p.release_per_s, positive, "rate at which a tip releases the tissue");
   settings.number("slip_per_s", p.slip_per_s, positive, "rate at which a push begins to slide");

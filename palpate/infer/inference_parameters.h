@@ -32,7 +32,7 @@ struct InferenceParameters {
   double skew = 0.03;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
-  double new_pose = 0.1;                                ///< and q has changed by this ratio of itself since
+  double new_pose = 0.1;  ///< ratio of itself by which q changes before the slow unknowns are learned again
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.
   double touch_per_s = 0.5;    ///< a free tip begins to touch

@@ -35,16 +35,18 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Cont
   const size_t k = *hands[instrument].contact;
   const ForceAt force = force_at(*body, fit.posterior, k);
   const double deviation_N = std::sqrt(force_covariance(force, fit).trace() / 3);
-  // Frames in which the patch stands where it stood share the model's error: they say the same, not more.
-  const Vec3 q_mm = fit.posterior.q_mm(k);
-  Vec3& learned_at_mm = hands[instrument].learned_at_mm;
-  const bool says_more =
-      (q_mm - learned_at_mm).norm() >= parameters.new_pose * std::max(q_mm.norm(), learned_at_mm.norm());
-  const bool tells_radius = force.force_N.norm() >= parameters.telling_force * deviation_N &&
-                            filter.probability(Hold::slide) <= kMaySlide && says_more;
+  const bool tells_radius =
+      force.force_N.norm() >= parameters.telling_force * deviation_N && filter.probability(Hold::slide) <= kMaySlide;
   if (!tells_radius) {
     forget(prior, Unknowns::log_radius(k), 1, belief);
     if (filter.most_probable() == Hold::slide) follow_slide(instrument);
+    return;
+  }
+  // Frames in which the patch stands where it stood share the model's error: they say the same, not more.
+  const Vec3 q_mm = fit.posterior.q_mm(k);
+  Vec3& learned_at_mm = hands[instrument].learned_at_mm;
+  if ((q_mm - learned_at_mm).norm() < parameters.new_pose * std::max(q_mm.norm(), learned_at_mm.norm())) {
+    forget(prior, Unknowns::offset(k), Unknowns::kContact - 3, belief);
     return;
   }
   learned_at_mm = q_mm;

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+#include <cstdlib>
+
 namespace palpate {
 namespace {
 
@@ -35,6 +38,22 @@ TEST(Belief, AContactThatEndsLeavesTheRestAsItWas) {
   const Belief none = without_contact(second, 0);
   EXPECT_TRUE(none.mean.isApprox(before.mean));
   EXPECT_TRUE(none.covariance.isApprox(before.covariance));
+}
+
+TEST(Belief, WhatIsNotLearnedIsConsideredAsInSchmidtsFilter) {
+  const Eigen::Index n = Unknowns::count(1), at = Unknowns::offset(0), count = Unknowns::kContact - 3;
+  std::srand(5);
+  const Eigen::MatrixXd root = Eigen::MatrixXd::Random(n, n), H = Eigen::MatrixXd::Random(6, n),
+                        R = 0.3 * Eigen::MatrixXd::Identity(6, 6), I = Eigen::MatrixXd::Identity(n, n);
+  const Eigen::VectorXd z = Eigen::VectorXd::Random(6);
+  const Belief prior{Eigen::VectorXd::Random(n), root * root.transpose()};
+  Eigen::MatrixXd K = prior.covariance * H.transpose() * (H * prior.covariance * H.transpose() + R).inverse();
+  Belief now{prior.mean + K * (z - H * prior.mean), (I - K * H) * prior.covariance};
+  forget(prior, at, count, now);
+  K.middleRows(at, count).setZero();  // Schmidt: the gain of what is only considered
+  const Eigen::MatrixXd expected = (I - K * H) * prior.covariance * (I - K * H).transpose() + K * R * K.transpose();
+  EXPECT_LT((now.mean - prior.mean - K * (z - H * prior.mean)).norm(), 1e-9);
+  EXPECT_LT((now.covariance - expected).norm(), 1e-9 * expected.norm());
 }
 
 }  // namespace
