@@ -25,12 +25,14 @@ struct Hand {
   int frames_expected = 0;            ///< until a touch elsewhere may be expected
   SceneMotion free_scene;             ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();   ///< the offset with which the patch was laid
+  int laid_anew = 0;                  ///< times in a row that the patch was laid anew for what its pose says
   Vec3 learned_at_mm = Vec3::Zero();  ///< q of the last frame that the slow unknowns were learned from
 };
 
 /// A frame's answer from which radius and place of these instruments' patches are to be laid anew.
 struct Renewal {
   Belief prior;
+  FrameData data;
   ContactFit fit;
   std::vector<size_t> instruments;
 };
@@ -93,7 +95,7 @@ struct FilterState {
   // renew_patch.cpp: radius and place of the patch
   /// Radius and place of the patch as believed by now. A weak force, or tissue that a tip may slide over, says nothing
   /// of the radius.
-  void renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit);
+  void renew_patch(size_t instrument, const Belief& prior, const FrameData& data, const ContactFit& fit);
 
   void look_ahead();
   void finish_look_ahead();
@@ -105,6 +107,8 @@ struct FilterState {
   double misfit_mm(const FrameData& data, const Belief& at, bool& explained) const;
 
  private:
+  /// The patch with another radius, as far on the way to it as the frame is better explained.
+  void lay_anew(size_t contact, double log_radius, const Belief& prior, const FrameData& data, double log_evidence);
   /// The patch where the tip has slid to.
   void follow_slide(size_t instrument);
   /// Has the body made ready for where a free tip is about to touch.

@@ -73,6 +73,11 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     if (hand.contact)
       if (const auto tip = s.contact_tip(hand, frame.tips[static_cast<size_t>(&hand - s.hands.data())]))
         data.tips.push_back(*tip);
+  const SceneMotion scene = prior.scene(s.about_mm);
+  for (const ContactTip& tip : data.tips) {
+    PatchReach& patch = s.patches[tip.contact];
+    patch.told_mm = (scene.undo(tip.tip_mm) - prior.offset_mm(tip.contact) - patch.center_mm).norm();
+  }
 
   ContactFit fit =
       s.body ? fit_contacts(prior, data, *s.body, s.model, s.context()) : fit_at_rest(prior, data, s.context());
@@ -115,7 +120,7 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     return hand.contact && hand.filter.most_probable() != Hold::free;
   });
   if (s.body && any_touches) answer.equilibrium = s.body->response.equilibrium;
-  if (fit.converged && s.body) s.renewal = Renewal{prior, fit, s.instrument_of_contact};
+  if (fit.converged && s.body) s.renewal = Renewal{prior, data, fit, s.instrument_of_contact};
   for (size_t i = 0; i < s.hands.size(); ++i) {
     const TipObservation& tip = frame.tips[i];
     Hand& hand = s.hands[i];

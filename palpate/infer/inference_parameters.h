@@ -10,7 +10,7 @@ struct InferenceParameters {
   double point_px = 0.07;        ///< deviation of a tracked point in one camera, px
   double point_dof = 4;          ///< Student-t degrees of freedom of a point
   double effective_points = 25;  ///< effective sample size: more points share their errors with neighbours
-  double motion_error = 0.08;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
+  double motion_error = 0.15;    ///< error of the model's motion of a point, ratio to a half-space's: |q| r / distance
   double tip_floor_mm = 0.05;    ///< least deviation of the tip's displacement
   double tip_disparity_px = 0.03;  ///< the same along the viewing ray: deviation of the tip's disparity
   double tip_dof = 6;              ///< Student-t degrees of freedom of the tip

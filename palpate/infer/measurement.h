@@ -24,6 +24,7 @@ std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, cons
 struct PatchReach {
   Vec3 center_mm = Vec3::Zero();  ///< at rest
   double radius_mm = 0;           ///< of the patch
+  double told_mm = 0;             ///< its displacement as the tip tells it; 0 where no tip is seen
 };
 
 /// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.
@@ -46,8 +47,8 @@ struct StereoProjection {
 };
 StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm);
 
-/// Error of where the model says that a point is, mm: a ratio of how far a half-space would move it, |q| r / distance.
-/// What is not known of the body (Saint-Venant) moves far tissue about as much as near, where Eq. 3 nearly cancels.
+/// Error of where the model says that a point is, mm: a ratio of how far a half-space would move it, |q| r / distance,
+/// where |q| is at least what the tip tells: else a small q would make the tissue's word for it the surer. What is not known of the body (Saint-Venant) moves far tissue about as much as near, where Eq. 3 nearly cancels.
 double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters);
 
 /// Tissue points in both cameras: z = pi(S (X + u)) - pi(X) + bias, px.

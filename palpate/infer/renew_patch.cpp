@@ -9,6 +9,10 @@ namespace {
 
 /// A patch whose radius has changed by this ratio is laid anew.
 constexpr double kRadiusChange = 0.08;
+/// A difference of log evidence that says nothing.
+constexpr double kAsGood = 1;
+/// So often in a row before it is learned from all the same.
+constexpr int kMaxLaidAnew = 4;
 /// Probability of a slide from which on the radius is kept.
 constexpr double kMaySlide = 0.05;
 /// A slid patch is laid anew when it stands so many radii from its place.
@@ -30,7 +34,29 @@ void FilterState::follow_slide(size_t instrument) {
   solve_anew();
 }
 
-void FilterState::renew_patch(size_t instrument, const Belief& prior, const ContactFit& fit) {
+void FilterState::lay_anew(size_t contact, double log_radius, const Belief& prior, const FrameData& data,
+                           double log_evidence) {
+  const double laid = std::log(model.radius_mm(contact));
+  for (double step : {1.0, 0.5, 0.25}) {
+    const std::optional<Equilibrium> equilibrium =
+        model.set_radius(contact, std::exp(laid + step * (log_radius - laid)), body->q_mm);
+    if (!equilibrium) continue;
+    SolvedBody tried = *body;
+    tried.response = model.respond(*equilibrium, body->q_mm);
+    tried.log_radius[contact] = std::log(model.radius_mm(contact));
+    const ContactFit again = fit_contacts(prior, data, tried, model, context());
+    if (!again.converged || again.log_evidence < log_evidence - kAsGood) continue;
+    body = std::move(tried);
+    return;
+  }
+  if (const std::optional<Equilibrium> equilibrium = model.set_radius(contact, std::exp(laid), body->q_mm)) {
+    body->response = model.respond(*equilibrium, body->q_mm);
+  } else {
+    solve_anew();
+  }
+}
+
+void FilterState::renew_patch(size_t instrument, const Belief& prior, const FrameData& data, const ContactFit& fit) {
   const HoldFilter& filter = hands[instrument].filter;
   const size_t k = *hands[instrument].contact;
   const ForceAt force = force_at(*body, fit.posterior, k);
@@ -42,31 +68,37 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Cont
     if (filter.most_probable() == Hold::slide) follow_slide(instrument);
     return;
   }
+  // Laid as the tissue says, without the operator's word; what it says of the slow unknowns is heard when it is
+  // linearized around what it says (iterated Kalman filter).
+  const auto allowed = [this](double log_radius) {
+    return std::clamp(log_radius, stated_log_radius() + std::log(parameters.min_radius_ratio),
+                      stated_log_radius() + std::log(parameters.max_radius_ratio));
+  };
+  const double log_radius = allowed(fit.kept.mean[Unknowns::log_radius(k)]);
+  Hand& hand = hands[instrument];
+  if (std::abs(log_radius - std::log(model.radius_mm(k))) > kRadiusChange && hand.laid_anew < kMaxLaidAnew) {
+    forget(prior, Unknowns::offset(k), Unknowns::kContact - 3, belief);
+    ++hand.laid_anew;
+    lay_anew(k, log_radius, prior, data, fit.log_evidence);
+    return;
+  }
+  hand.laid_anew = 0;
   // Frames in which the patch stands where it stood share the model's error: they say the same, not more.
   const Vec3 q_mm = fit.posterior.q_mm(k);
-  Vec3& learned_at_mm = hands[instrument].learned_at_mm;
-  if ((q_mm - learned_at_mm).norm() < parameters.new_pose * std::max(q_mm.norm(), learned_at_mm.norm())) {
+  if ((q_mm - hand.learned_at_mm).norm() < parameters.new_pose * std::max(q_mm.norm(), hand.learned_at_mm.norm())) {
     forget(prior, Unknowns::offset(k), Unknowns::kContact - 3, belief);
     return;
   }
-  learned_at_mm = q_mm;
-  // Laid as the tissue says, without the operator's word, so that what the tissue says next is right to first order.
-  double& log_radius = belief.mean[Unknowns::log_radius(k)];
-  log_radius = std::clamp(log_radius, stated_log_radius() + std::log(parameters.min_radius_ratio),
-                          stated_log_radius() + std::log(parameters.max_radius_ratio));
-  if (std::abs(log_radius - std::log(model.radius_mm(k))) > kRadiusChange) {
-    const std::optional<Equilibrium> equilibrium = model.set_radius(k, std::exp(log_radius), body->q_mm);
-    if (!equilibrium) return;
-    body->response = model.respond(*equilibrium, body->q_mm);
-    body->log_radius[k] = std::log(model.radius_mm(k));
-  }
+  double& learned = belief.mean[Unknowns::log_radius(k)];
+  learned = allowed(learned);
+  hand.learned_at_mm = q_mm;
 }
 
 void FilterState::look_ahead() {
   has_looked_ahead = true;
   const bool is_current = renewal && renewal->prior.mean.size() == belief.mean.size();
   for (size_t i = 0; is_current && i < renewal->instruments.size(); ++i)
-    renew_patch(renewal->instruments[i], renewal->prior, renewal->fit);
+    renew_patch(renewal->instruments[i], renewal->prior, renewal->data, renewal->fit);
   renewal.reset();
   if (body) model.refresh();
 }

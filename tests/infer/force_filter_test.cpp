@@ -110,13 +110,14 @@ struct PullRun {
   FrameAnswer last;
 };
 
-/// Comes down in 12 frames, takes hold, pulls by 3 mm in 12 and stays for 6.
-PullRun pull(Made& made, ForceFilter& filter, double breath_mm, int hidden_from = 1000, int hidden_to = 1000) {
+/// Comes down in 12 frames, takes hold, pulls by 3 mm in 12 and stays for 6. `way`: -1 presses.
+PullRun pull(Made& made, ForceFilter& filter, double breath_mm, int hidden_from = 1000, int hidden_to = 1000,
+             double way = 1) {
   PullRun run;
   for (int i = 0; i < 31; ++i) {
     const Vec3 scene_mm = breath_mm * std::sin(0.1 * i) * Vec3(0.3, 0.8, 0.5);
     const double height_mm = i < 12 ? 0.15 * (12 - i) * (12 - i) : 0;
-    const double pulled_mm = 3 * std::clamp((i - 13) / 12.0, 0.0, 1.0);
+    const double pulled_mm = way * 3 * std::clamp((i - 13) / 12.0, 0.0, 1.0);
     const bool is_held = i >= 12;
     const Vec3 q_mm(0.2 * pulled_mm, 0, -height_mm - pulled_mm);
     const FrameEvidence frame = made.frame(i, q_mm, scene_mm, is_held, i < hidden_from || i >= hidden_to);
@@ -171,6 +172,27 @@ TEST(ForceFilter, ARadiusToldAtHalfOrTwiceHarmsItLessThanHalfAsMuchAsTheTipAlone
     const PullRun run = pull(made, fused, 0), tip_run = pull(again, by_tip, 0);
     EXPECT_GT(tip_run.last_error_N, 0.3 * run.peak_N) << ratio;
     EXPECT_LT(run.last_error_N, 0.5 * tip_run.last_error_N) << ratio;
+  }
+}
+
+/// Force at the end of a press or a pull, ratio to the truth, through a body that is thinner than the true one.
+double told_through_a_thin_body(double stated_ratio, double way) {
+  Made made;
+  ContactOptions contact;
+  contact.footprint_radius_mm = stated_ratio * kTrueRadius_mm;
+  contact.grip = Grip::grasp;
+  ForceFilter filter(ContactModel(thin_slab, kTissue, Element::averaged), thin_slab({}), made.points(), da_vinci(),
+                     contact);
+  const PullRun run = pull(made, filter, 0, 1000, 1000, way);
+  return run.last.instruments[0].force_N.norm() / made.force_N().norm();
+}
+
+TEST(ForceFilter, WhereTheTissueTellsTheRadiusTheForceHardlyHangsOnTheOneStated) {
+  for (const double way : {1.0, -1.0}) {
+    const double half = told_through_a_thin_body(0.5, way), twice = told_through_a_thin_body(2, way);
+    EXPECT_NEAR(half, twice, 0.2) << way;
+    EXPECT_NEAR(half, 1, 0.2) << way;
+    EXPECT_NEAR(twice, 1, 0.2) << way;
   }
 }
 

@@ -69,6 +69,21 @@ TEST(Measurement, TheModelErrsByARatioOfWhatAHalfSpaceWouldDo) {
   EXPECT_NEAR(error_mm(30), 0.5 * parameters.motion_error, 1e-12);
 }
 
+TEST(Measurement, ASmallDisplacementThatTheTipContradictsDoesNotMakeTheModelSurer) {
+  const InferenceParameters parameters;
+  ContactResponse response;
+  const std::vector<SurfacePlace> places(1);
+  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3, 4}};
+  TissuePoint point;
+  point.rest_mm = {6, 0, 90};
+  for (const double q_mm : {0.1, 2.0, 4.0}) {
+    Eigen::VectorXd x0 = Eigen::VectorXd::Zero(Unknowns::count(1));
+    x0[Unknowns::q(0)] = q_mm;
+    const PredictedBody body{&response, &places, x0, Vec3::Zero(), &patches};
+    EXPECT_NEAR(model_error_mm(point, body, parameters), 0.5 * 4 * parameters.motion_error, 1e-12) << q_mm;
+  }
+}
+
 TEST(Measurement, ATipIsLessSureAlongTheViewingRay) {
   const InferenceParameters parameters;
   const Rectification rig = turned_rig();
