@@ -48,7 +48,8 @@ struct StereoProjection {
 StereoProjection project_stereo(const Rectification& rectification, const Vec3& point_mm);
 
 /// Error of where the model says that a point is, mm: a ratio of how far a half-space would move it, |q| r / distance,
-/// where |q| is at least what the tip tells: else a small q would make the tissue's word for it the surer. What is not known of the body (Saint-Venant) moves far tissue about as much as near, where Eq. 3 nearly cancels.
+/// where |q| is at least what the tip tells: else a small q would make the tissue's word for it the surer. What is not
+/// known of the body (Saint-Venant) moves far tissue about as much as near, where Eq. 3 nearly cancels.
 double model_error_mm(const TissuePoint& point, const PredictedBody& body, const InferenceParameters& parameters);
 
 /// Tissue points in both cameras: z = pi(S (X + u)) - pi(X) + bias, px.
