@@ -81,4 +81,11 @@ void forget(const Belief& before, Eigen::Index at, Eigen::Index count, Belief& n
   now.covariance.block(at, at, count, count) = before.covariance.block(at, at, count, count);
 }
 
+void with_marginal(Eigen::Index at, double mean, double variance, Belief& belief) {
+  const double before = belief.covariance(at, at);
+  const Eigen::VectorXd per_unit = belief.covariance.col(at) / before;
+  belief.mean += per_unit * (mean - belief.mean[at]);
+  belief.covariance += (variance - before) * per_unit * per_unit.transpose();
+}
+
 }  // namespace palpate

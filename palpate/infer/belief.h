@@ -54,4 +54,7 @@ Belief without_contact(const Belief& belief, size_t contact);
 /// as they are.
 void forget(const Belief& before, Eigen::Index at, Eigen::Index count, Belief& now);
 
+/// One unknown known otherwise: what is believed of the others, given that one, stays (Jeffrey's rule).
+void with_marginal(Eigen::Index at, double mean, double variance, Belief& belief);
+
 }  // namespace palpate

@@ -40,10 +40,7 @@ ContactFit fit_rows(const Belief& prior, const FrameData& data, const PredictedB
     const Eigen::Index at = Unknowns::log_radius(k);
     const AgreedRadius radius =
         agreed_radius(fit.kept.mean[at], fit.kept.covariance(at, at), context.stated_log_radius, context.parameters);
-    fit.posterior.mean[at] = radius.log_radius;
-    fit.posterior.covariance.row(at).setZero();
-    fit.posterior.covariance.col(at).setZero();
-    fit.posterior.covariance(at, at) = radius.variance;
+    with_marginal(at, radius.log_radius, radius.variance, fit.posterior);
   }
   return fit;
 }

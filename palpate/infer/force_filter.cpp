@@ -73,10 +73,9 @@ FrameAnswer ForceFilter::update(const FrameEvidence& frame) {
     if (hand.contact)
       if (const auto tip = s.contact_tip(hand, frame.tips[static_cast<size_t>(&hand - s.hands.data())]))
         data.tips.push_back(*tip);
-  const SceneMotion scene = prior.scene(s.about_mm);
   for (const ContactTip& tip : data.tips) {
-    PatchReach& patch = s.patches[tip.contact];
-    patch.told_mm = (scene.undo(tip.tip_mm) - prior.offset_mm(tip.contact) - patch.center_mm).norm();
+    s.patches[tip.contact].tip_mm = tip.tip_mm;
+    s.patches[tip.contact].tip_offset_mm = prior.offset_mm(tip.contact);
   }
 
   ContactFit fit =

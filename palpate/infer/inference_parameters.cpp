@@ -34,6 +34,14 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("offset_walk_mm", p.offset_walk_mm, {0, 100}, "random walk of the offset, mm per sqrt(s)");
   settings.number("log_radius_walk", p.log_radius_walk, {0, 100}, "random walk of the log radius per sqrt(s)");
   settings.number("telling_force", p.telling_force, {0, 1000}, "the radius is learned at so many deviations of force");
+  settings.number("radius_change", p.radius_change, {0, 1},
+                  "ratio by which the radius told differs from the one of the patch before it is laid anew");
+  settings.number("laid_anew", p.laid_anew, {0, 100},
+                  "so often in a row before radius and offset are learned all the same");
+  settings.number("as_good", p.as_good, {0, 100}, "a difference of log evidence that says nothing");
+  settings.number("may_slide", p.may_slide, {0, 1}, "probability of a slide from which on the radius is kept");
+  settings.number("slide_reach_radii", p.slide_reach_radii, {0, 10},
+                  "a slid patch is laid anew so many radii from its place");
   settings.number("new_pose", p.new_pose, {0, 10},
                   "change of the patch's displacement, ratio to it, before radius and offset are learned again");
   settings.number("touch_per_s", p.touch_per_s, positive, "rate at which a free tip begins to touch");

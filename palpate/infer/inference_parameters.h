@@ -32,7 +32,12 @@ struct InferenceParameters {
   double skew = 0.03;                                   ///< common error of the model's motion of all tissue, ratio
   double offset_walk_mm = 0.05, log_radius_walk = 0.1;  ///< the same, per square root of a second
   double telling_force = 3;                             ///< the radius is learned where the force is so many deviations
-  double new_pose = 0.1;  ///< ratio of itself by which q changes before the slow unknowns are learned again
+  double radius_change = 0.08;     ///< ratio by which the radius told differs from the one laid before it is laid anew
+  double laid_anew = 4;            ///< so often in a row before the slow unknowns are learned all the same
+  double as_good = 1;              ///< a difference of log evidence that says nothing
+  double may_slide = 0.05;         ///< probability of a slide from which on the radius is kept
+  double slide_reach_radii = 0.4;  ///< a slid patch is laid anew so many radii from its place
+  double new_pose = 0.1;           ///< ratio of itself by which q changes before the slow unknowns are learned again
 
   // What holds the tissue: rates in 1/s, densities of a tip that begins to touch.
   double touch_per_s = 0.5;    ///< a free tip begins to touch

@@ -66,7 +66,12 @@ double model_error_mm(const TissuePoint& point, const PredictedBody& body, const
   for (size_t k = 0; k < body.patches->size(); ++k) {
     const PatchReach& patch = (*body.patches)[k];
     const double decay = std::min(1.0, patch.radius_mm / (point.rest_mm - patch.center_mm).norm());
-    error2_mm2 += std::pow(parameters.motion_error * std::max(at.q_mm(k).norm(), patch.told_mm) * decay, 2);
+    double displaced_mm = at.q_mm(k).norm();
+    if (patch.tip_mm) {
+      const Vec3 told_mm = at.scene(body.about_mm).undo(*patch.tip_mm) - patch.tip_offset_mm - patch.center_mm;
+      displaced_mm = std::max(displaced_mm, told_mm.norm());
+    }
+    error2_mm2 += std::pow(parameters.motion_error * displaced_mm * decay, 2);
   }
   return std::sqrt(error2_mm2);
 }

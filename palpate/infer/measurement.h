@@ -20,11 +20,12 @@ struct SurfacePlace {
 std::vector<SurfacePlace> places_of(const std::vector<TissuePoint>& points, const std::vector<Vec3>& nodes_mm,
                                     const std::vector<Triangle>& boundary);
 
-/// Where a patch is laid, for the model's error around it.
+/// Where a patch is laid and where its tip is seen, for the model's error around it.
 struct PatchReach {
-  Vec3 center_mm = Vec3::Zero();  ///< at rest
-  double radius_mm = 0;           ///< of the patch
-  double told_mm = 0;             ///< its displacement as the tip tells it; 0 where no tip is seen
+  Vec3 center_mm = Vec3::Zero();              ///< at rest
+  double radius_mm = 0;                       ///< of the patch
+  std::optional<Vec3> tip_mm = std::nullopt;  ///< as measured, left camera frame; nothing where it is not seen
+  Vec3 tip_offset_mm = Vec3::Zero();          ///< of the tip from the middle of the patch, as believed before
 };
 
 /// What a measurement is compared with: the body as a response to first order, or at rest where `response` is null.

@@ -5,28 +5,13 @@
 
 namespace palpate {
 
-namespace {
-
-/// A patch whose radius has changed by this ratio is laid anew.
-constexpr double kRadiusChange = 0.08;
-/// A difference of log evidence that says nothing.
-constexpr double kAsGood = 1;
-/// So often in a row before it is learned from all the same.
-constexpr int kMaxLaidAnew = 4;
-/// Probability of a slide from which on the radius is kept.
-constexpr double kMaySlide = 0.05;
-/// A slid patch is laid anew when it stands so many radii from its place.
-constexpr double kSlideReach_radii = 0.4;
-
-}  // namespace
-
 void FilterState::follow_slide(size_t instrument) {
   Hand& hand = hands[instrument];
   const size_t k = *hand.contact;
   const Vec3 normal = model.footprint(k).normal;
   Vec3 slid_mm = belief.offset_mm(k) - hand.slid_from_mm;
   slid_mm -= slid_mm.dot(normal) * normal;
-  if (slid_mm.norm() <= kSlideReach_radii * model.radius_mm(k)) return;
+  if (slid_mm.norm() <= parameters.slide_reach_radii * model.radius_mm(k)) return;
   const Vec3 from_mm = model.footprint(k).center_mm;
   model.move(k, from_mm + slid_mm);
   belief.mean.segment<3>(Unknowns::offset(k)) -= model.footprint(k).center_mm - from_mm;
@@ -45,7 +30,7 @@ void FilterState::lay_anew(size_t contact, double log_radius, const Belief& prio
     tried.response = model.respond(*equilibrium, body->q_mm);
     tried.log_radius[contact] = std::log(model.radius_mm(contact));
     const ContactFit again = fit_contacts(prior, data, tried, model, context());
-    if (!again.converged || again.log_evidence < log_evidence - kAsGood) continue;
+    if (!again.converged || again.log_evidence < log_evidence - parameters.as_good) continue;
     body = std::move(tried);
     return;
   }
@@ -61,8 +46,8 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Fram
   const size_t k = *hands[instrument].contact;
   const ForceAt force = force_at(*body, fit.posterior, k);
   const double deviation_N = std::sqrt(force_covariance(force, fit).trace() / 3);
-  const bool tells_radius =
-      force.force_N.norm() >= parameters.telling_force * deviation_N && filter.probability(Hold::slide) <= kMaySlide;
+  const bool tells_radius = force.force_N.norm() >= parameters.telling_force * deviation_N &&
+                            filter.probability(Hold::slide) <= parameters.may_slide;
   if (!tells_radius) {
     forget(prior, Unknowns::log_radius(k), 1, belief);
     if (filter.most_probable() == Hold::slide) follow_slide(instrument);
@@ -76,7 +61,8 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Fram
   };
   const double log_radius = allowed(fit.kept.mean[Unknowns::log_radius(k)]);
   Hand& hand = hands[instrument];
-  if (std::abs(log_radius - std::log(model.radius_mm(k))) > kRadiusChange && hand.laid_anew < kMaxLaidAnew) {
+  if (std::abs(log_radius - std::log(model.radius_mm(k))) > parameters.radius_change &&
+      hand.laid_anew < parameters.laid_anew) {
     forget(prior, Unknowns::offset(k), Unknowns::kContact - 3, belief);
     ++hand.laid_anew;
     lay_anew(k, log_radius, prior, data, fit.log_evidence);

@@ -56,5 +56,24 @@ TEST(Belief, WhatIsNotLearnedIsConsideredAsInSchmidtsFilter) {
   EXPECT_LT((now.covariance - expected).norm(), 1e-9 * expected.norm());
 }
 
+TEST(Belief, AnotherMarginalOfOneUnknownLeavesTheOthersGivenIt) {
+  const Eigen::Index n = Unknowns::count(1), at = Unknowns::log_radius(0);
+  std::srand(6);
+  const Eigen::MatrixXd root = Eigen::MatrixXd::Random(n, n);
+  const Belief before{Eigen::VectorXd::Random(n), root * root.transpose()};
+  Belief now = before;
+  with_marginal(at, 0.7, 0.04, now);
+  EXPECT_NEAR(now.mean[at], 0.7, 1e-12);
+  EXPECT_NEAR(now.covariance(at, at), 0.04, 1e-12);
+  // The others, given that this one is 2.
+  const auto given = [&](const Belief& b) {
+    const Eigen::VectorXd column = b.covariance.col(at);
+    return Belief{b.mean + column * (2 - b.mean[at]) / b.covariance(at, at),
+                  b.covariance - column * column.transpose() / b.covariance(at, at)};
+  };
+  EXPECT_LT((given(now).mean - given(before).mean).norm(), 1e-9);
+  EXPECT_LT((given(now).covariance - given(before).covariance).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace palpate

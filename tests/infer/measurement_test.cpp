@@ -73,7 +73,7 @@ TEST(Measurement, ASmallDisplacementThatTheTipContradictsDoesNotMakeTheModelSure
   const InferenceParameters parameters;
   ContactResponse response;
   const std::vector<SurfacePlace> places(1);
-  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3, 4}};
+  const std::vector<PatchReach> patches = {{Vec3(0, 0, 90), 3, Vec3(0.5, 4, 90), Vec3(0.5, 0, 0)}};
   TissuePoint point;
   point.rest_mm = {6, 0, 90};
   for (const double q_mm : {0.1, 2.0, 4.0}) {
