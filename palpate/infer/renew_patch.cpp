@@ -61,7 +61,9 @@ void FilterState::renew_patch(size_t instrument, const Belief& prior, const Fram
   };
   const double log_radius = allowed(fit.kept.mean[Unknowns::log_radius(k)]);
   Hand& hand = hands[instrument];
-  if (std::abs(log_radius - std::log(model.radius_mm(k))) > parameters.radius_change &&
+  const Eigen::Index at = Unknowns::log_radius(k);
+  const bool is_told = fit.kept.covariance(at, at) < std::pow(parameters.log_radius / 2, 2);
+  if (is_told && std::abs(log_radius - std::log(model.radius_mm(k))) > parameters.radius_change &&
       hand.laid_anew < parameters.laid_anew) {
     forget(prior, Unknowns::offset(k), Unknowns::kContact - 3, belief);
     ++hand.laid_anew;
