@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 
 /// The force of a frame is wanted to a per mille; the tip is not known better.
-constexpr double kFrameResidual = 1e-4;
+constexpr double kFrameResidual = 1e-5;
 /// Ratio of the radii between which the derivative by log radius is differenced: wide enough to smooth over which
 /// triangles a patch covers.
 constexpr double kRadiusStep = 1.25;
