@@ -4,6 +4,7 @@
 #include <cholmod.h>
 
 #include <cstring>
+#include <mutex>
 #include <stdexcept>
 #include <vector>
 
@@ -137,6 +138,9 @@ void SparseFactor::analyze(const Eigen::SparseMatrix<double>& lower, const std::
   cholmod_free_factor(&state_->factor, &state_->common);
   const bool is_given = order.size() == view.nrow;
   state_->common.method[0].ordering = is_given ? CHOLMOD_GIVEN : CHOLMOD_METIS;
+  // METIS draws from the C library's generator and seeds it anew: alone, it finds the same order each time.
+  static std::mutex one_at_a_time;
+  const std::lock_guard<std::mutex> lock(one_at_a_time);
   state_->factor = is_given ? cholmod_analyze_p(&view, const_cast<int*>(order.data()), nullptr, 0, &state_->common)
                             : cholmod_analyze(&view, &state_->common);
   if (!state_->factor) throw std::runtime_error("SparseFactor: symbolic analysis failed");

@@ -22,8 +22,7 @@ std::vector<Measurement> rows_of(const FrameData& data, const PredictedBody& bod
   for (const ContactTip& tip : data.tips)
     if (model)
       rows.push_back(tip_measurement(tip.tip_mm, tip.covariance_mm2, tip.contact,
-                                     model->footprint(tip.contact).center_mm, body, context.rectification,
-                                     context.parameters));
+                                     model->footprint(tip.contact).center_mm, body, context.parameters));
   return rows;
 }
 

@@ -92,10 +92,12 @@ Mat3 FilterState::force_covariance(const ForceAt& at, const ContactFit& fit) con
 
 std::optional<ContactTip> FilterState::contact_tip(const Hand& hand, const TipObservation& tip) const {
   if (!tip.visible) return std::nullopt;
+  const Mat3 floor_mm2 = tip_floor_covariance_mm2(tip, rectification, parameters);
   if (tip.since_mark_mm)
-    return ContactTip{*hand.contact, hand.tip_at_mark_mm + *tip.since_mark_mm, tip.since_mark_covariance_mm2};
+    return ContactTip{*hand.contact, hand.tip_at_mark_mm + *tip.since_mark_mm,
+                      tip.since_mark_covariance_mm2 + floor_mm2};
   return ContactTip{*hand.contact, tip.tip_mm,
-                    tip.covariance_mm2 + parameters.gap_mm * parameters.gap_mm * Mat3::Identity()};
+                    tip.covariance_mm2 + floor_mm2 + parameters.gap_mm * parameters.gap_mm * Mat3::Identity()};
 }
 
 }  // namespace palpate

@@ -148,18 +148,19 @@ std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& see
   return measurements;
 }
 
-Mat3 tip_floor_covariance_mm2(const Vec3& tip_mm, const Rectification& rectification,
+Mat3 tip_floor_covariance_mm2(const TipObservation& tip, const Rectification& rectification,
                               const InferenceParameters& parameters) {
-  const double z_mm = rectified_depth_mm(rectification, tip_mm);
+  const Mat3 floor_mm2 = std::pow(parameters.tip_floor_mm, 2) * Mat3::Identity();
+  if (!tip.is_seen) return floor_mm2;
+  const double z_mm = rectified_depth_mm(rectification, tip.tip_mm);
   const double along_mm =
       z_mm * z_mm / (rectification.focal_px * rectification.baseline_mm) * parameters.tip_disparity_px;
-  const Vec3 ray = tip_mm.normalized();
-  return std::pow(parameters.tip_floor_mm, 2) * Mat3::Identity() + along_mm * along_mm * ray * ray.transpose();
+  const Vec3 ray = tip.tip_mm.normalized();
+  return floor_mm2 + along_mm * along_mm * ray * ray.transpose();
 }
 
 Measurement tip_measurement(const Vec3& tip_mm, const Mat3& covariance_mm2, size_t contact, const Vec3& center_mm,
-                            const PredictedBody& body, const Rectification& rectification,
-                            const InferenceParameters& parameters) {
+                            const PredictedBody& body, const InferenceParameters& parameters) {
   const Belief at{body.x0, {}};
   const SceneMotion scene = at.scene(body.about_mm);
   const Mat3 L = scene.linear();
@@ -170,7 +171,7 @@ Measurement tip_measurement(const Vec3& tip_mm, const Mat3& covariance_mm2, size
   fill_scene_columns(scene, y_mm, Mat3::Identity(), m.H);
   m.H.middleCols<3>(Unknowns::q(contact)) = L;
   m.H.middleCols<3>(Unknowns::offset(contact)) = L;
-  m.covariance = covariance_mm2 + tip_floor_covariance_mm2(tip_mm, rectification, parameters);
+  m.covariance = covariance_mm2;
   m.dof = parameters.tip_dof;
   return m;
 }

@@ -5,6 +5,7 @@
 
 #include "palpate/contact/contact_model.h"
 #include "palpate/infer/map_estimate.h"
+#include "palpate/instrument/instrument_tracker.h"
 #include "palpate/observe/tissue_tracker.h"
 
 namespace palpate {
@@ -57,15 +58,14 @@ double model_error_mm(const TissuePoint& point, const PredictedBody& body, const
 std::vector<Measurement> tissue_measurements(const std::vector<TissuePoint>& seen, const PredictedBody& body,
                                              const Rectification& rectification, const InferenceParameters& parameters);
 
-/// Covariance of the displacement of a tip that no tracker knows better than this, mm2: far less sure along the viewing
-/// ray than across it.
-Mat3 tip_floor_covariance_mm2(const Vec3& tip_mm, const Rectification& rectification,
+/// Covariance of a tip's displacement that no tracker knows better than this, mm2: that of a tip which the cameras see
+/// is far less sure along the viewing ray than across it; a robot's is not.
+Mat3 tip_floor_covariance_mm2(const TipObservation& tip, const Rectification& rectification,
                               const InferenceParameters& parameters);
 
 /// The tip: z = S (X_c + q + offset), mm. `center_mm`: of the patch at rest.
 Measurement tip_measurement(const Vec3& tip_mm, const Mat3& covariance_mm2, size_t contact, const Vec3& center_mm,
-                            const PredictedBody& body, const Rectification& rectification,
-                            const InferenceParameters& parameters);
+                            const PredictedBody& body, const InferenceParameters& parameters);
 
 /// Motion expected of every point, px, for the tracker's search.
 std::vector<Vec3> expected_motion_px(const std::vector<TissuePoint>& points, const PredictedBody& body,

@@ -12,7 +12,7 @@ double FilterState::log_free_tip(size_t instrument, const TipObservation& tip, c
   const Hand& hand = hands[instrument];
   const Vec3 tip_mm = free.scene(about_mm).undo(tip.tip_mm);
   const double step_mm = parameters.hand_mm_per_s * seconds;
-  const Mat3 walk = step_mm * step_mm * Mat3::Identity() + tip_floor_covariance_mm2(tip_mm, rectification, parameters);
+  const Mat3 walk = step_mm * step_mm * Mat3::Identity() + tip_floor_covariance_mm2(tip, rectification, parameters);
   const Gap gap = gap_to_surface(tip_mm, rest_mm, rest_boundary);
   const double deviation_mm = std::hypot(parameters.gap_mm, std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal)));
   const double from_last =
@@ -71,7 +71,7 @@ ContactFit FilterState::free_of(const Belief& prior, const FrameData& data, size
   for (const ContactTip& tip : data.tips) {
     const size_t in_model = tip.contact + (tip.contact >= contact);
     rows.push_back(tip_measurement(tip.tip_mm, tip.covariance_mm2, tip.contact, model.footprint(in_model).center_mm,
-                                   predicted, rectification, parameters));
+                                   predicted, parameters));
   }
   const MapEstimate estimate = maximum_a_posteriori(prior, predicted.x0, rows);
   ContactFit fit;

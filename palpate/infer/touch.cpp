@@ -69,10 +69,11 @@ void FilterState::begin(size_t instrument, const TipObservation& tip, const Gap&
     prior.q_covariance_mm2 = deviation_mm * deviation_mm * Mat3::Identity();
   }
   begin_at(instrument, place_at_rest(gap), prior);
-  // Where the tip stands against the patch: the displacement of the first frame is known to touch_mm.
+  // Where the tip stands against the patch: the displacement of the first frame is known to touch_mm, and from now on
+  // the tip counts from here.
   FrameData data;
   data.seconds = 0.04;
-  data.tips.push_back({*hand.contact, tip.tip_mm, Mat3::Zero()});  // from now on the tip counts from here
+  data.tips.push_back({*hand.contact, tip.tip_mm, tip_floor_covariance_mm2(tip, rectification, parameters)});
   const ContactFit fit = fit_linear(belief, data, *body, model, context());
   belief = fit.kept;
   hand.slid_from_mm = belief.offset_mm(*hand.contact);
@@ -93,7 +94,7 @@ void FilterState::look_for_touch(size_t instrument, const FrameEvidence& frame, 
   free.gap_mm = gap.distance_mm;
   free.gap_deviation_mm = std::sqrt(gap.normal.dot(tip.covariance_mm2 * gap.normal));
   free.step_mm = tip_mm - *hand.last_tip_mm;
-  free.step_covariance_mm2 = tip_floor_covariance_mm2(tip_mm, rectification, parameters);
+  free.step_covariance_mm2 = tip_floor_covariance_mm2(tip, rectification, parameters);
   const bool closes = tip.closed.value_or(false) && hand.was_closed == false;
   const double reach_mm = options.threshold_mm + std::min(2 * free.gap_deviation_mm, 0.5 * options.threshold_mm);
   if (free.gap_mm > reach_mm || tip.closed == false) {

@@ -47,6 +47,7 @@ struct TipObservation {
   Vec3 velocity_mm_per_s = Vec3::Zero();
   std::optional<Vec3> since_mark_mm;  ///< displacement since `mark`, better known than the tip itself
   Mat3 since_mark_covariance_mm2 = Mat3::Identity();
+  bool is_seen = true;                              ///< by the cameras, whose disparity limits its depth; else told
   std::optional<bool> closed;                       ///< jaws hold, where a tip track says so
   std::array<std::optional<ImageTip>, 2> in_image;  ///< where the masks end, rectified left and right image
 };

@@ -138,6 +138,7 @@ TipObservation TipTracker::update(const std::optional<TipTrack::Row>& row) {
   visible_ = row.has_value();
   if (!visible_) return observation;
   observation.visible = true;
+  observation.is_seen = false;
   observation.tip_mm = row->tip_mm;
   observation.closed = row->closed;
   observation.covariance_mm2 = kBias_mm * kBias_mm * Mat3::Identity();

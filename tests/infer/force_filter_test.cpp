@@ -58,7 +58,8 @@ std::vector<TissuePoint> grid_of_points() {
 /// Tissue that is held by a patch of the true radius, in a scene that breathes, seen with noise.
 class Made {
  public:
-  Made() : truth_(slab, kTissue, Element::averaged), points_(grid_of_points()) {
+  explicit Made(const TissueOptions& tissue = kTissue, unsigned seed = 7)
+      : truth_(slab, tissue, Element::averaged), points_(grid_of_points()), random_(seed) {
     truth_.begin(kPlace_mm, kTrueRadius_mm);
     places_ = places_of(points_, truth_.model().rest_mm(), truth_.boundary());
   }
@@ -101,7 +102,7 @@ class Made {
   std::vector<TissuePoint> points_;
   std::vector<SurfacePlace> places_;
   Equilibrium equilibrium_;
-  std::mt19937 random_{7};
+  std::mt19937 random_;
   std::optional<Vec3> marked_;
 };
 
@@ -131,12 +132,13 @@ PullRun pull(Made& made, ForceFilter& filter, double breath_mm, int hidden_from 
   return run;
 }
 
-ForceFilter filter_for(const Made& made, double stated_radius_mm, Drive drive = Drive::fused) {
+ForceFilter filter_for(const Made& made, double stated_radius_mm, Drive drive = Drive::fused,
+                       const TissueOptions& tissue = kTissue) {
   ContactOptions contact;
   contact.footprint_radius_mm = stated_radius_mm;
   contact.grip = Grip::grasp;
   contact.drive = drive;
-  return ForceFilter(ContactModel(slab, kTissue, Element::averaged), slab({}), made.points(), da_vinci(), contact);
+  return ForceFilter(ContactModel(slab, tissue, Element::averaged), slab({}), made.points(), da_vinci(), contact);
 }
 
 TEST(ForceFilter, NoContactBeginsWhereNoneMay) {
@@ -175,16 +177,19 @@ TEST(ForceFilter, ARadiusToldAtHalfOrTwiceHarmsItLessThanHalfAsMuchAsTheTipAlone
   }
 }
 
-/// Force at the end of a press or a pull whose radius is told at twice, ratio to the truth.
-double told_at_twice(double way) {
-  Made made;
-  ForceFilter filter = filter_for(made, 2 * kTrueRadius_mm);
+/// Force at the end of a press or a pull whose radius is told at twice, ratio to the truth. Neo-Hookean: pressed, Saint
+/// Venant-Kirchhoff takes less force the deeper it is, and none belongs to a depth alone.
+double told_at_twice(double way, unsigned seed) {
+  const TissueOptions tissue{Law::neo_hookean, 27, 0.4, ""};
+  Made made(tissue, seed);
+  ForceFilter filter = filter_for(made, 2 * kTrueRadius_mm, Drive::fused, tissue);
   const PullRun run = pull(made, filter, 0, 1000, 1000, way);
   return run.last.instruments[0].force_N.norm() / made.force_N().norm();
 }
 
-TEST(ForceFilter, ARadiusToldAtTwiceIsFoundInAPressAsInAPull) {
-  for (const double way : {1.0, -1.0}) EXPECT_NEAR(told_at_twice(way), 1, 0.15) << way;
+TEST(ForceFilter, ARadiusToldAtTwiceIsFoundInAPressAsInAPullWhateverTheNoise) {
+  for (const double way : {1.0, -1.0})
+    for (const unsigned seed : {1U, 4U, 7U}) EXPECT_NEAR(told_at_twice(way, seed), 1, 0.1) << way << " " << seed;
 }
 
 /// By how much the radius changes, as a ratio, while a thin body's patch is held still for 1.6 s after a pull.

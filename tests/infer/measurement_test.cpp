@@ -84,13 +84,18 @@ TEST(Measurement, ASmallDisplacementThatTheTipContradictsDoesNotMakeTheModelSure
   }
 }
 
-TEST(Measurement, ATipIsLessSureAlongTheViewingRay) {
+TEST(Measurement, ATipIsLessSureAlongTheViewingRayWhereTheCamerasTellIt) {
   const InferenceParameters parameters;
   const Rectification rig = turned_rig();
-  const Vec3 tip_mm(0, 0, 100);
-  const Mat3 covariance = tip_floor_covariance_mm2(tip_mm, rig, parameters);
+  TipObservation near, far;
+  near.tip_mm = Vec3(0, 0, 100);
+  far.tip_mm = Vec3(0, 0, 200);
+  const Mat3 covariance = tip_floor_covariance_mm2(near, rig, parameters);
   EXPECT_GT(covariance(2, 2), covariance(0, 0));
-  EXPECT_GT(tip_floor_covariance_mm2({0, 0, 200}, rig, parameters)(2, 2), covariance(2, 2));
+  EXPECT_GT(tip_floor_covariance_mm2(far, rig, parameters)(2, 2), covariance(2, 2));
+  far.is_seen = false;
+  const Mat3 told = tip_floor_covariance_mm2(far, rig, parameters);
+  EXPECT_DOUBLE_EQ(told(2, 2), told(0, 0));
 }
 
 }  // namespace
