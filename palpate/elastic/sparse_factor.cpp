@@ -30,13 +30,17 @@ cholmod_sparse lower_view(const Eigen::SparseMatrix<double>& lower) {
   return view;
 }
 
-/// The supernodes of a CHOLMOD factor in single precision.
+/// The supernodes of a CHOLMOD factor in single precision, free of the unit of stiffness: what is rounded is the same
+/// for a soft body as for a stiff one.
 struct RoughFactor {
-  std::vector<float> values;  // of L, supernode by supernode, column-major
+  double scale = 1;           // of L: its first entry
+  std::vector<float> values;  // of L / scale, supernode by supernode, column-major
 
   void copy(const cholmod_factor& factor) {
     const auto* x = static_cast<const double*>(factor.x);
-    values.assign(x, x + factor.xsize);
+    scale = factor.xsize > 0 ? x[0] : 1;
+    values.resize(factor.xsize);
+    for (size_t i = 0; i < factor.xsize; ++i) values[i] = static_cast<float>(x[i] / scale);
   }
 
   /// L L^T x = P b, supernode by supernode.
@@ -48,7 +52,9 @@ struct RoughFactor {
     const auto* permutation = static_cast<const int*>(factor.Perm);
     const auto n = static_cast<size_t>(b.size());
     std::vector<float> x(n), below(factor.maxesize + 1);
-    for (size_t i = 0; i < n; ++i) x[i] = static_cast<float>(b[permutation[i]]);
+    const double largest = b.lpNorm<Eigen::Infinity>();
+    if (!(largest > 0)) return Eigen::VectorXd::Zero(b.size());
+    for (size_t i = 0; i < n; ++i) x[i] = static_cast<float>(b[permutation[i]] / largest);
     struct Supernode {
       int columns, rows;  // rows beneath the columns' own
       const float *own, *beneath;
@@ -82,8 +88,9 @@ struct RoughFactor {
       }
       cblas_strsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, s.columns, s.own, s.stride, s.x, 1);
     }
+    const double unit = largest / (scale * scale);
     Eigen::VectorXd result(b.size());
-    for (size_t i = 0; i < n; ++i) result[permutation[i]] = x[i];
+    for (size_t i = 0; i < n; ++i) result[permutation[i]] = unit * x[i];
     return result;
   }
 };

@@ -41,5 +41,28 @@ TEST(SparseFactor, OrdersTheSameWhateverAnotherThreadOrdersMeanwhile) {
   EXPECT_EQ(others, 0);
 }
 
+TEST(SparseFactor, SolvesRoughlyTheSameInEveryUnitOfStiffness) {
+  const Eigen::SparseMatrix<double> A = laplacian(6);
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(A.rows(), -1, 2);
+  const auto solved = [&](double stiffness) {
+    SparseFactor factor;
+    const Eigen::SparseMatrix<double> scaled = stiffness * A;
+    factor.analyze(scaled);
+    EXPECT_TRUE(factor.factorize(scaled));
+    return factor.solve_roughly(stiffness * b);
+  };
+  const Eigen::VectorXd x = solved(1);
+  EXPECT_LT((A.selfadjointView<Eigen::Lower>() * x - b).norm(), 1e-5 * b.norm());
+  for (const double stiffness : {1e-60, 1e60}) EXPECT_LT((solved(stiffness) - x).norm(), 1e-7 * x.norm()) << stiffness;
+}
+
+TEST(SparseFactor, SolvesRoughlyForNothingWhereNothingPulls) {
+  SparseFactor factor;
+  const Eigen::SparseMatrix<double> A = laplacian(3);
+  factor.analyze(A);
+  ASSERT_TRUE(factor.factorize(A));
+  EXPECT_TRUE(factor.solve_roughly(Eigen::VectorXd::Zero(A.rows())).isZero(0));
+}
+
 }  // namespace
 }  // namespace palpate
