@@ -38,22 +38,30 @@ void FilterState::report(size_t instrument, const ContactFit& fit, const TipObse
   answer.stretch = answer.q_mm.norm() / std::max(attachments_mm, 5 * options.footprint_radius_mm);
 }
 
-double FilterState::misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {
+std::vector<PointMisfit> FilterState::misfits(const std::vector<TissuePoint>& tissue, const Belief& at) const {
   PredictedBody predicted{nullptr, nullptr, at.mean, about_mm};
   if (body) predicted = {&body->response, &body->places, body->unknowns(at), about_mm, &patches};
-  const std::vector<Measurement> rows = tissue_measurements(data.tissue, predicted, rectification, parameters);
-  std::vector<double> misfits;
+  const std::vector<Measurement> rows = tissue_measurements(tissue, predicted, rectification, parameters);
   const double max_distance2 = std::pow(parameters.unexplained_deviations, 2);
-  size_t unexplained = 0;
+  std::vector<PointMisfit> misfits;
   for (size_t i = 0; i < rows.size(); ++i) {
     const Eigen::VectorXd residual = rows[i].residual - rows[i].H * (at.mean - predicted.x0);
-    misfits.push_back(residual.head<2>().norm() * data.tissue[i].rest_mm.z() / rectification.focal_px);
-    unexplained += residual.dot(rows[i].covariance.ldlt().solve(residual)) > max_distance2;
+    misfits.push_back({residual.head<2>().norm() * tissue[i].rest_mm.z() / rectification.focal_px,
+                       residual.dot(rows[i].covariance.ldlt().solve(residual)) <= max_distance2});
   }
-  explained = rows.size() < 10 ||
-              static_cast<double>(unexplained) < parameters.unexplained_ratio * static_cast<double>(rows.size());
-  if (misfits.empty()) return 0;
-  return median_of(misfits);
+  return misfits;
+}
+
+double FilterState::misfit_mm(const FrameData& data, const Belief& at, bool& explained) const {
+  std::vector<double> all_mm;
+  double unexplained = 0;
+  for (const PointMisfit& misfit : misfits(data.tissue, at)) {
+    all_mm.push_back(misfit.mm);
+    unexplained += !misfit.explained;
+  }
+  explained = all_mm.size() < 10 || unexplained < parameters.unexplained_ratio * static_cast<double>(all_mm.size());
+  if (all_mm.empty()) return 0;
+  return median_of(all_mm);
 }
 
 }  // namespace palpate

@@ -10,6 +10,20 @@
 
 namespace palpate {
 
+/// Where a touch may have gone by unnoticed; in the map frame.
+struct PassedTouch {
+  Vec3 place_mm = Vec3::Zero();  ///< of the surface, at rest
+  Vec3 tip_mm = Vec3::Zero();
+  double log_odds = 0;  ///< that it touched
+  double time_s = 0;
+};
+
+/// How far a tissue point is from its prediction.
+struct PointMisfit {
+  double mm = 0;  ///< across the viewing ray
+  bool explained = true;
+};
+
 /// What is kept of one instrument.
 struct Hand {
   explicit Hand(Grip grip) : filter(grip) {}
@@ -19,10 +33,13 @@ struct Hand {
   std::optional<Vec3> last_tip_mm;     ///< in the map frame
   std::optional<Vec3> released_at_mm;  ///< in the map frame, until it has left
   std::optional<bool> was_closed;
+  bool is_felt = false;      ///< its force has been told from none
   bool is_confirmed = true;  ///< the tissue of a later frame has said that it holds
   bool is_told = false;      ///< the operator says where it holds; there is no tip
   double onset_s = 0;
   int frames_expected = 0;            ///< until a touch elsewhere may be expected
+  std::optional<PassedTouch> passed;  ///< the most probable one since the tip was last out of reach
+  double looked_back_s = 0;           ///< when a contact was last begun there
   SceneMotion free_scene;             ///< while a contact is kept that is more probably none
   Vec3 slid_from_mm = Vec3::Zero();   ///< the offset with which the patch was laid
   int laid_anew = 0;                  ///< times in a row that the patch was laid anew for what its pose says
@@ -116,9 +133,16 @@ struct FilterState {
   Gap gap_of(const Vec3& tip_in_map_mm) const;
   Vec3 place_at_rest(const Gap& gap) const;
   ContactPrior prior_of_touch() const;
+  /// Of a tip that has displaced the tissue by about q before it was noticed.
+  ContactPrior prior_of_unnoticed_touch(const Vec3& q_mm) const;
   void begin_at(size_t instrument, const Vec3& place_mm, const ContactPrior& prior);
-  /// The contact begins where the tip is nearest to the surface.
-  void begin(size_t instrument, const TipObservation& tip, const Gap& gap, bool unnoticed);
+  /// The contact begins at this place of the surface, and from now on the tip counts from here.
+  void begin(size_t instrument, const TipObservation& tip, const Vec3& place_mm, const ContactPrior& prior);
+  /// Keeps where the tip most probably touched.
+  void remember_touch(Hand& hand, const Gap& gap, const Vec3& tip_mm, double log_odds) const;
+  /// A touch that went by unnoticed begins where it was when the tissue around is moved by something.
+  void look_back(size_t instrument, const FrameEvidence& frame, const Vec3& tip_mm, InstrumentAnswer& answer);
+  std::vector<PointMisfit> misfits(const std::vector<TissuePoint>& tissue, const Belief& at) const;
   /// log p(tip | free) in the map frame; nothing where there is no tip.
   double log_free_tip(size_t instrument, const TipObservation& tip, const Belief& free, double seconds) const;
   double force_per_mm(size_t contact) const;

@@ -131,6 +131,8 @@ void FilterState::score_holds(size_t instrument, const Belief& prior, const Fram
     return;
   }
   hand.is_confirmed = true;
+  const double deviation_N = std::sqrt(force_covariance(force, tied).trace() / 3);
+  hand.is_felt |= force.force_N.norm() > parameters.telling_force * deviation_N;
   if (sliding && hand.filter.most_probable() == Hold::slide) tied = *sliding;
 }
 

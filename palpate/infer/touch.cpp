@@ -9,6 +9,8 @@ namespace {
 
 /// The body for a contact is made ready so many frames before the tip would be there, and not anew in less than that.
 constexpr int kExpectedFrames = 4;
+/// The nearest points around a place tell whether it has moved; fewer than half of them do not.
+constexpr size_t kPointsAsked = 8;
 
 }  // namespace
 
@@ -46,6 +48,8 @@ void FilterState::begin_at(size_t instrument, const Vec3& place_mm, const Contac
   hand.contact = model.contact_count() - 1;
   instrument_of_contact.push_back(instrument);
   hand.released_at_mm.reset();
+  hand.is_felt = false;
+  hand.passed.reset();
   hand.slid_from_mm.setZero();
   hand.onset_s = last_time_s;
   belief = with_contact(belief, prior);
@@ -59,18 +63,19 @@ void FilterState::begin_told(size_t instrument, const FrameEvidence& frame) {
   hands[instrument].free_scene = belief.scene(about_mm);
 }
 
-void FilterState::begin(size_t instrument, const TipObservation& tip, const Gap& gap, bool unnoticed) {
+ContactPrior FilterState::prior_of_unnoticed_touch(const Vec3& q_mm) const {
+  ContactPrior prior = prior_of_touch();
+  prior.q_mm = q_mm;
+  const double deviation_mm = parameters.touch_mm + 0.5 * q_mm.norm();
+  prior.q_covariance_mm2 = deviation_mm * deviation_mm * Mat3::Identity();
+  return prior;
+}
+
+void FilterState::begin(size_t instrument, const TipObservation& tip, const Vec3& place_mm, const ContactPrior& prior) {
   Hand& hand = hands[instrument];
   hand.tip_at_mark_mm = tip.tip_mm;
-  ContactPrior prior = prior_of_touch();
-  if (unnoticed) {
-    prior.q_mm = std::min(0.0, gap.distance_mm) * gap.normal;
-    const double deviation_mm = parameters.touch_mm + 0.5 * std::abs(gap.distance_mm);
-    prior.q_covariance_mm2 = deviation_mm * deviation_mm * Mat3::Identity();
-  }
-  begin_at(instrument, place_at_rest(gap), prior);
-  // Where the tip stands against the patch: the displacement of the first frame is known to touch_mm, and from now on
-  // the tip counts from here.
+  begin_at(instrument, place_mm, prior);
+  // Where the tip stands against the patch: the displacement of the first frame is known as the prior says.
   FrameData data;
   data.seconds = 0.04;
   data.tips.push_back({*hand.contact, tip.tip_mm, tip_floor_covariance_mm2(tip, rectification, parameters)});
@@ -99,23 +104,61 @@ void FilterState::look_for_touch(size_t instrument, const FrameEvidence& frame, 
   const double reach_mm = options.threshold_mm + std::min(2 * free.gap_deviation_mm, 0.5 * options.threshold_mm);
   if (free.gap_mm > reach_mm || tip.closed == false) {
     expect_touch(hand, gap, free.step_mm, tip_mm);
+    look_back(instrument, frame, tip_mm, answer);
     return;
   }
   TouchEvidence evidence = touch_evidence(free, seconds, parameters);
-  if (hand.released_at_mm && !evidence.unnoticed) return;
   const double rate = 1 - std::exp(-parameters.touch_per_s * seconds);
   double log_odds = std::log(rate / (1 - rate)) + evidence.log_ratio;
   if (closes) log_odds = parameters.told_log_odds;
   const double probability = 1 / (1 + std::exp(-log_odds));
-  if (probability < 0.5) {
-    expect_touch(hand, gap, free.step_mm, tip_mm);
+  remember_touch(hand, gap, tip_mm, log_odds);
+  if (probability < 0.5 || (hand.released_at_mm && !evidence.unnoticed)) {
+    if (probability < 0.5) expect_touch(hand, gap, free.step_mm, tip_mm);
+    look_back(instrument, frame, tip_mm, answer);
     return;
   }
   answer.is_off_limits = frame.may_be_held && !frame.may_be_held(place_at_rest(gap));
   if (answer.is_off_limits) return;
-  begin(instrument, tip, gap, evidence.unnoticed && !closes);
-  hand.is_confirmed = !evidence.unnoticed || closes;
-  hand.filter.touch(evidence.unnoticed && !closes ? std::min(probability, parameters.unconfirmed) : probability);
+  const bool unnoticed = evidence.unnoticed && !closes;
+  begin(instrument, tip, place_at_rest(gap),
+        unnoticed ? prior_of_unnoticed_touch(std::min(0.0, gap.distance_mm) * gap.normal) : prior_of_touch());
+  hand.is_confirmed = !unnoticed;
+  hand.filter.touch(unnoticed ? std::min(probability, parameters.unconfirmed) : probability);
+  answer.begins = true;
+}
+
+void FilterState::remember_touch(Hand& hand, const Gap& gap, const Vec3& tip_mm, double log_odds) const {
+  if (hand.passed && hand.passed->log_odds > log_odds && last_time_s - hand.passed->time_s < parameters.remembered_s)
+    return;
+  hand.passed = PassedTouch{place_at_rest(gap), tip_mm, log_odds, last_time_s};
+}
+
+void FilterState::look_back(size_t instrument, const FrameEvidence& frame, const Vec3& tip_mm,
+                            InstrumentAnswer& answer) {
+  Hand& hand = hands[instrument];
+  if (!hand.passed || last_time_s - hand.passed->time_s > parameters.remembered_s ||
+      last_time_s - hand.looked_back_s < parameters.look_back_s)
+    return;
+  const Vec3 place_mm = hand.passed->place_mm;
+  std::vector<TissuePoint> around = usable(frame.tissue);
+  const auto distance_mm = [&](const TissuePoint& point) { return (point.rest_mm - place_mm).norm(); };
+  std::erase_if(around, [&](const TissuePoint& point) {
+    return distance_mm(point) > parameters.look_back_radii * options.footprint_radius_mm;
+  });
+  if (around.size() < kPointsAsked / 2) return;
+  const size_t asked = std::min(kPointsAsked, around.size());
+  std::partial_sort(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(asked), around.end(),
+                    [&](const TissuePoint& a, const TissuePoint& b) { return distance_mm(a) < distance_mm(b); });
+  around.resize(asked);
+  double moved = 0;
+  for (const PointMisfit& misfit : misfits(around, belief)) moved += !misfit.explained;
+  if (moved < parameters.look_back_ratio * static_cast<double>(asked)) return;
+  hand.looked_back_s = last_time_s;
+  if (frame.may_be_held && !frame.may_be_held(place_mm)) return;
+  begin(instrument, frame.tips[instrument], place_mm, prior_of_unnoticed_touch(tip_mm - hand.passed->tip_mm));
+  hand.is_confirmed = false;
+  hand.filter.touch(parameters.unconfirmed);
   answer.begins = true;
 }
 
@@ -130,7 +173,8 @@ void FilterState::expect_touch(Hand& hand, const Gap& gap, const Vec3& step_mm, 
 void FilterState::release(size_t instrument, const Belief& without) {
   Hand& hand = hands[instrument];
   const size_t contact = *hand.contact;
-  hand.released_at_mm = hand.last_tip_mm;
+  // Where nothing was ever felt the tip has not let go of anything: it may be about to touch.
+  if (hand.is_felt) hand.released_at_mm = hand.last_tip_mm;
   hand.contact.reset();
   hand.filter.release();
   model.end(contact);

@@ -215,6 +215,43 @@ TEST(ForceFilter, AHandThatHoldsStillTeachesTheRadiusLittleMore) {
   EXPECT_LT(drift, 0.06);
 }
 
+TEST(ForceFilter, ATouchThatWentByUnnoticedIsFoundByTheTissueThatItMoves) {
+  Made made;
+  InferenceParameters blind;
+  blind.touch_per_s = blind.unnoticed = 1e-9;
+  ContactOptions contact;
+  contact.footprint_radius_mm = kTrueRadius_mm;
+  contact.grip = Grip::grasp;
+  ForceFilter filter(ContactModel(slab, kTissue, Element::averaged), slab({}), made.points(), da_vinci(), contact,
+                     blind);
+  const PullRun run = pull(made, filter, 0);
+  EXPECT_EQ(run.last.instruments[0].hold, Hold::grasp);
+  EXPECT_LT(run.last_error_N, 0.1 * run.peak_N);
+}
+
+TEST(ForceFilter, AfterATipThatOvershotNothingIsReleasedAndTheTouchIsSeen) {
+  Made made;
+  ForceFilter filter = filter_for(made, kTrueRadius_mm);
+  const auto show = [&](int i, double aside_mm, double height_mm) {
+    return filter.update(made.frame(i, Vec3(aside_mm, 0, -height_mm), Vec3::Zero(), false)).instruments[0];
+  };
+  bool begins = false;
+  for (int i = 0; i < 6; ++i) begins |= show(i, 2.3, 3.0 * (5 - i) - 2).begins;
+  EXPECT_TRUE(begins);
+  show(6, 1.2, -1);
+  show(7, 0.4, 0.3);
+  show(8, 0, 0.3);
+  PullRun run;
+  for (int i = 9; i < 26; ++i) {
+    const double pulled_mm = 3 * std::clamp((i - 12) / 12.0, 0.0, 1.0);
+    const FrameEvidence frame = made.frame(i, Vec3(0, 0, -pulled_mm), Vec3::Zero(), true);
+    run.last = filter.update(frame);
+    if (run.last.instruments[0].begins) made.mark(frame);
+  }
+  EXPECT_EQ(run.last.instruments[0].hold, Hold::grasp);
+  EXPECT_LT((run.last.instruments[0].force_N - made.force_N()).norm(), 0.1 * made.force_N().norm());
+}
+
 TEST(ForceFilter, AScenesMotionIsNoForce) {
   Made made;
   ForceFilter filter = filter_for(made, kTrueRadius_mm);
