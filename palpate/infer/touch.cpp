@@ -141,19 +141,23 @@ void FilterState::look_back(size_t instrument, const FrameEvidence& frame, const
       last_time_s - hand.looked_back_s < parameters.look_back_s)
     return;
   const Vec3 place_mm = hand.passed->place_mm;
-  std::vector<TissuePoint> around = usable(frame.tissue);
+  std::vector<TissuePoint> tissue = usable(frame.tissue);
   const auto distance_mm = [&](const TissuePoint& point) { return (point.rest_mm - place_mm).norm(); };
-  std::erase_if(around, [&](const TissuePoint& point) {
-    return distance_mm(point) > parameters.look_back_radii * options.footprint_radius_mm;
-  });
-  if (around.size() < kPointsAsked / 2) return;
-  const size_t asked = std::min(kPointsAsked, around.size());
-  std::partial_sort(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(asked), around.end(),
-                    [&](const TissuePoint& a, const TissuePoint& b) { return distance_mm(a) < distance_mm(b); });
-  around.resize(asked);
-  double moved = 0;
-  for (const PointMisfit& misfit : misfits(around, belief)) moved += !misfit.explained;
-  if (moved < parameters.look_back_ratio * static_cast<double>(asked)) return;
+  std::sort(tissue.begin(), tissue.end(),
+            [&](const TissuePoint& x, const TissuePoint& y) { return distance_mm(x) < distance_mm(y); });
+  size_t near = 0;
+  while (near < std::min(kPointsAsked, tissue.size()) &&
+         distance_mm(tissue[near]) < parameters.look_back_radii * options.footprint_radius_mm)
+    ++near;
+  if (near < kPointsAsked / 2) return;
+  const std::vector<PointMisfit> all = misfits(tissue, belief);
+  const auto unexplained_ratio = [&all](size_t from, size_t to) {
+    double unexplained = 0;
+    for (size_t i = from; i < to; ++i) unexplained += !all[i].explained;
+    return unexplained / std::max(1.0, static_cast<double>(to - from));
+  };
+  // Tissue that is misplaced everywhere is not moved by this tip.
+  if (unexplained_ratio(0, near) - unexplained_ratio(near, all.size()) < parameters.look_back_ratio) return;
   hand.looked_back_s = last_time_s;
   if (frame.may_be_held && !frame.may_be_held(place_mm)) return;
   begin(instrument, frame.tips[instrument], place_mm, prior_of_unnoticed_touch(tip_mm - hand.passed->tip_mm));
