@@ -55,9 +55,11 @@ void describe(Settings& settings, InferenceParameters& p) {
   settings.number("inside_mm", p.inside_mm, positive, "how deep such a tip may be");
   settings.number("remembered_s", p.remembered_s, positive, "how long a touch that may have gone by is kept in mind");
   settings.number("look_back_s", p.look_back_s, positive, "between two looks whether one has gone by");
-  settings.number("look_back_radii", p.look_back_radii, positive,
-                  "tissue so near to where it may have been, over the stated radius, tells whether it has");
-  settings.number("look_back_ratio", p.look_back_ratio, probability, "where more of that tissue is not explained");
+  settings.number("look_back_points", p.look_back_points, positive,
+                  "points nearest to where it may have been that tell whether it has");
+  settings.number("look_back_radii", p.look_back_radii, positive, "how near they are, in stated radii");
+  settings.number("look_back_ratio", p.look_back_ratio, probability,
+                  "where, by this ratio, more of them than of all others are not explained");
   settings.number("unconfirmed", p.unconfirmed, probability,
                   "max. probability of such a touch until the next frame's tissue confirms it");
   settings.number("told_log_odds", p.told_log_odds, positive, "log odds of what the jaws are seen to do");

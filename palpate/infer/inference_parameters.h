@@ -50,7 +50,8 @@ struct InferenceParameters {
   double inside_mm = 10;          ///< how deep such a tip may be
   double remembered_s = 2;        ///< how long a touch that may have gone by unnoticed is kept in mind
   double look_back_s = 0.2;       ///< between two looks whether it has
-  double look_back_radii = 4;     ///< tissue so near to its place, over the stated radius, tells
+  double look_back_points = 8;    ///< so many points of the tissue nearest to its place; half of them are enough
+  double look_back_radii = 4;     ///< as near to it as so many stated radii
   double look_back_ratio = 0.35;  ///< of its nearest points, where more than elsewhere are not explained
   double unconfirmed = 0.4;       ///< max. probability of such a touch, until the next frame's tissue confirms it
   double told_log_odds = 10;      ///< of what the jaws are seen to do: closing they touch, closed they are not free

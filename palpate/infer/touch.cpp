@@ -9,8 +9,6 @@ namespace {
 
 /// The body for a contact is made ready so many frames before the tip would be there, and not anew in less than that.
 constexpr int kExpectedFrames = 4;
-/// The nearest points around a place tell whether it has moved; fewer than half of them do not.
-constexpr size_t kPointsAsked = 8;
 
 }  // namespace
 
@@ -146,10 +144,11 @@ void FilterState::look_back(size_t instrument, const FrameEvidence& frame, const
   std::sort(tissue.begin(), tissue.end(),
             [&](const TissuePoint& x, const TissuePoint& y) { return distance_mm(x) < distance_mm(y); });
   size_t near = 0;
-  while (near < std::min(kPointsAsked, tissue.size()) &&
+  const auto asked = static_cast<size_t>(parameters.look_back_points);
+  while (near < std::min(asked, tissue.size()) &&
          distance_mm(tissue[near]) < parameters.look_back_radii * options.footprint_radius_mm)
     ++near;
-  if (near < kPointsAsked / 2) return;
+  if (near < (asked + 1) / 2) return;
   const std::vector<PointMisfit> all = misfits(tissue, belief);
   const auto unexplained_ratio = [&all](size_t from, size_t to) {
     double unexplained = 0;
