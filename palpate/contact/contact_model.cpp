@@ -10,8 +10,8 @@ namespace palpate {
 
 namespace {
 
-/// Relative to the largest nodal force. Measured (rendered sequences; tests/app/slab.yaml): 1e-4 takes 5 % less of a frame's time but
-/// lets rounding move a force by up to 3e-4; 1e-6 takes 4 % more and moves no force by more than 1e-4.
+/// Relative to the largest nodal force. Measured (rendered sequences; tests/app/slab.yaml): 1e-4 takes 5 % less of a
+/// frame's time but lets rounding move a force by up to 3e-4; 1e-6 takes 4 % more and moves no force by more than 1e-4.
 constexpr double kFrameResidual = 1e-5;
 /// Ratio of the radii between which the derivative by log radius is differenced: wide enough to smooth over which
 /// triangles a patch covers.
